@@ -1,0 +1,209 @@
+"""The plain cutting-plane loop: linear relaxation, separators, and again, with no branching and no solver's own cuts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.bounds.relaxation import InfeasibleRelaxationError, Relaxation, RelaxationPoint
+from bcut.bounds.safe import SafeBound
+from bcut.formulations.formulation import Formulation
+from bcut.objectives.objective import Objective
+from bcut.separation.driver import IntegerCut, Separation
+
+# Cuts that have been slack for this many rounds leave the relaxation.
+_ROUNDS_SLACK = 4
+_SLACK = 1e-7
+
+
+@dataclass(frozen=True)
+class Round:
+    """One solved relaxation: its value, and the cuts that were then added, by family."""
+
+    lp: float
+    cuts: dict[str, int]
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class RootLimits:
+    """When the loop stops before the separators run dry.
+
+    Attributes
+    ----------
+    rounds : int
+        Relaxations with cuts, at most.
+    stall_rounds : int
+        Stop after this many rounds in a row that moved the bound by less than `stall` (relative to its size).
+    stall : float
+    deadline : float, optional
+        Value of `time.monotonic`.
+    target : Fraction, optional
+        Stop as soon as ``sign * bound`` is proven to exceed it.
+    """
+
+    rounds: int = 1000
+    stall_rounds: int = 30
+    stall: float = 1e-6
+    deadline: float | None = None
+    target: Fraction | None = None
+
+
+@dataclass
+class RootBound:
+    """What the loop found.
+
+    Attributes
+    ----------
+    status : {"integral", "dry", "stalled", "limit", "target", "infeasible"}
+        Why it ended: an integral point, no more violated cuts, no progress, a limit, a bound beyond the target, or
+        no point at all.
+    lp, lp_after_cuts : float or None
+        LP values before and after cuts, unrounded; None where none was found in time.
+    rounds : list of Round
+    first, last : SafeBound or None
+        Exact bounds proven by the duals of the first and of the best relaxation (the latter with its cuts).
+    point : ndarray of float or None
+        The last relaxation point.
+    cuts : list of IntegerCut
+        The cuts in the last relaxation.
+    """
+
+    status: Literal["integral", "dry", "stalled", "limit", "target", "infeasible"] = "limit"
+    lp: float | None = None
+    lp_after_cuts: float | None = None
+    rounds: list[Round] = field(default_factory=list)
+    first: SafeBound | None = None
+    last: SafeBound | None = None
+    point: NDArray[np.float64] | None = None
+    cuts: list[IntegerCut] = field(default_factory=list)
+
+
+class _Loop:
+    def __init__(
+        self,
+        formulation: Formulation,
+        objective: Objective,
+        separation: Separation | None,
+        limits: RootLimits,
+        on_round: Callable[[Round], None] | None,
+    ) -> None:
+        self.relaxation = Relaxation(formulation, objective, deadline=limits.deadline)
+        self.separation, self.limits, self.on_round = separation, limits, on_round
+        self.result = RootBound()
+        self.slack_for: dict[tuple[bytes, bytes, int], int] = {}
+        self.stalled = 0
+
+    def run(self) -> RootBound:
+        result = self.result
+        try:
+            while self._step():
+                pass
+        except InfeasibleRelaxationError:
+            result.status = "infeasible"
+        result.cuts = list(self.relaxation.cuts)
+        return result
+
+    def _step(self) -> bool:
+        """Solve, record, separate; tell whether to go on."""
+        started = time.perf_counter()
+        point = self.relaxation.solve()
+        if point is None:
+            self.result.status = "limit"
+            return False
+        self._record(point)
+        cuts = self._separate(point)
+        counts: dict[str, int] = {}
+        for cut in cuts:
+            counts[cut.family] = counts.get(cut.family, 0) + 1
+        self._finish_round(Round(point.value, counts, time.perf_counter() - started))
+        if not cuts:
+            return False
+        self._drop_slack(point)
+        self.relaxation.add(cuts)
+        return True
+
+    def _record(self, point: RelaxationPoint) -> None:
+        result = self.result
+        previous = result.lp_after_cuts
+        result.point, result.lp_after_cuts = point.x, point.value
+        bound = self.relaxation.safe_bound(point.duals)
+        if result.first is None:
+            result.first, result.lp = bound, point.value
+        if result.last is None or bound.value >= result.last.value:
+            result.last = bound
+        moved = previous is None or abs(point.value - previous) > self.limits.stall * max(1.0, abs(previous))
+        self.stalled = 0 if moved else self.stalled + 1
+
+    def _separate(self, point: RelaxationPoint) -> list[IntegerCut]:
+        """Return new cuts; none when the loop should end, with the reason in the result's status."""
+        result, limits = self.result, self.limits
+        if np.minimum(point.x, 1 - point.x).max(initial=0.0) <= 1e-6:
+            result.status = "integral"
+        elif limits.target is not None and result.last is not None and result.last.value > limits.target:
+            result.status = "target"
+        elif self.stalled >= limits.stall_rounds:
+            result.status = "stalled"
+        elif self.separation is None or not self.separation.separators:
+            result.status = "dry"
+        elif len(result.rounds) >= limits.rounds:
+            result.status = "limit"
+        else:
+            cuts = self.separation.round(point.x)
+            for cut in cuts:
+                self.separation.confirm(cut)
+            if not cuts:
+                result.status = "dry"
+            return cuts
+        return []
+
+    def _finish_round(self, finished: Round) -> None:
+        self.result.rounds.append(finished)
+        if self.on_round is not None:
+            self.on_round(finished)
+
+    def _drop_slack(self, point: RelaxationPoint) -> None:
+        """Drop cuts that have been slack for some rounds: they only slow the relaxation down."""
+        assert self.separation is not None
+        leaving = []
+        for position, (cut, slack) in enumerate(zip(self.relaxation.cuts, point.slack, strict=True)):
+            age = self.slack_for.get(cut.key, 0) + 1 if slack > _SLACK else 0
+            self.slack_for[cut.key] = age
+            if age >= _ROUNDS_SLACK:
+                leaving.append(position)
+        for cut in self.relaxation.drop(leaving):
+            self.separation.forget(cut)
+            del self.slack_for[cut.key]
+
+
+def root_bound(
+    formulation: Formulation,
+    objective: Objective,
+    separation: Separation | None = None,
+    *,
+    limits: RootLimits | None = None,
+    on_round: Callable[[Round], None] | None = None,
+) -> RootBound:
+    """Bound the optimum by the linear relaxation and cuts.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    objective : Objective
+    separation : Separation, optional
+        Separators at work; none gives the LP bound.
+    limits : RootLimits, optional
+    on_round : callable, optional
+        Told of every finished round.
+
+    Returns
+    -------
+    RootBound
+    """
+    return _Loop(formulation, objective, separation, limits or RootLimits(), on_round).run()

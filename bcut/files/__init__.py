@@ -1,0 +1,5 @@
+"""Point configurations in files: native JSON, TOPCOM, tables, NumPy arrays, OFF and PLY."""
+
+from bcut.files.registry import FORMATS, SUFFIXES, format_points, read_points, write_points
+
+__all__ = ["FORMATS", "SUFFIXES", "format_points", "read_points", "write_points"]

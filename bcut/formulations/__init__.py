@@ -1,0 +1,1 @@
+"""Integer programs whose solutions are triangulations, as sparse rows without any solver."""

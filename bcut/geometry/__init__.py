@@ -1,0 +1,1 @@
+"""Exact geometry: coordinates, orientations, candidate simplices, crossings, triangulations. No solver in sight."""

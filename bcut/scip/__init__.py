@@ -1,0 +1,1 @@
+"""The SCIP host: the only place that imports PySCIPOpt."""

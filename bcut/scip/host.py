@@ -1,0 +1,227 @@
+"""Branch-and-cut: a formulation and separators in, an optimum or the best that the limits allowed out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pyscipopt import SCIP_PARAMSETTING, Model, Variable
+
+from bcut.bounds.root import Round
+from bcut.errors import SolverError
+from bcut.formulations.formulation import Formulation
+from bcut.objectives.objective import Objective
+from bcut.scip.model import build_model
+from bcut.scip.plugins import LpValues, Observer, SeparatorAdapter
+from bcut.separation.driver import IntegerCut, Separation
+
+TreeStatus = Literal["optimal", "infeasible", "limit", "interrupted"]
+
+
+@dataclass(frozen=True)
+class TreeOptions:
+    """How SCIP is to search.
+
+    Attributes
+    ----------
+    seconds : float, optional
+        Time limit.
+    nodes : int, optional
+        Node limit; 1 stops after the root.
+    seed : int
+        Of SCIP's random number generators.
+    cutoff : float, optional
+        Only solutions strictly better than this value (in the sense of the objective) are wanted.
+    scip_separators : bool
+        Whether SCIP's own separators run.
+    presolve : bool
+    heuristics : bool
+    separate_every : int
+        Depths between nodes at which our separators run; 0 for the root only.
+    root_rounds, tree_rounds : int
+        Rounds of our separators per node.
+    """
+
+    seconds: float | None = None
+    nodes: int | None = None
+    seed: int = 0
+    cutoff: float | None = None
+    scip_separators: bool = True
+    presolve: bool = True
+    heuristics: bool = True
+    separate_every: int = 1
+    root_rounds: int = 1000
+    tree_rounds: int = 5
+
+
+@dataclass
+class TreeResult:
+    """What SCIP found.
+
+    Attributes
+    ----------
+    status : {"optimal", "infeasible", "limit", "interrupted"}
+        "infeasible" also when nothing is better than the cutoff.
+    columns : ndarray of int, or None
+        The chosen simplices of the best solution.
+    bound : float or None
+        SCIP's dual bound, in the sense of the objective.
+    nodes : int
+    rounds : list of Round
+        Root relaxations.
+    """
+
+    status: TreeStatus
+    columns: NDArray[np.int64] | None
+    bound: float | None
+    nodes: int
+    rounds: list[Round] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+def branch_and_cut(
+    formulation: Formulation,
+    objective: Objective,
+    separation: Separation | None = None,
+    *,
+    options: TreeOptions | None = None,
+    cuts: Sequence[IntegerCut] = (),
+    start: NDArray[np.integer] | None = None,
+    on_progress: Callable[[dict[str, Any]], None] | None = None,
+) -> TreeResult:
+    """Solve a formulation with SCIP.
+
+    Parameters
+    ----------
+    formulation : Formulation
+    objective : Objective
+    separation : Separation, optional
+        Our separators at work on exactly this formulation.
+    options : TreeOptions, optional
+    cuts : sequence of IntegerCut
+        Known valid cuts, rows of the root relaxation from the start.
+    start : ndarray of int, optional
+        Columns of a known triangulation.
+    on_progress : callable, optional
+        Told of new bounds and incumbents.
+
+    Raises
+    ------
+    SeparatorError
+        If a separator raised.
+    SolverError
+        If SCIP failed.
+    """
+    options = options or TreeOptions()
+    started = time.perf_counter()
+    model, variables = build_model(formulation, objective, cuts=cuts, name=formulation.configuration.name)
+    _set_parameters(model, options)
+    values = LpValues(variables)
+    adapter = _include_adapter(model, separation, values, options)
+    observer = Observer(objective, values, adapter, on_progress)
+    model.includeEventhdlr(observer, "bcut-observer", "records root bounds")
+    if start is not None:
+        _add_start(model, variables, start)
+    error = _optimize(model)
+    captured = (adapter.error if adapter else None) or observer.error
+    if captured is not None:
+        raise captured
+    if error is not None:
+        raise SolverError(f"SCIP failed on {formulation.configuration.name}: {error}") from error
+    result = _collect(model, variables, observer)
+    result.seconds = time.perf_counter() - started
+    model.freeProb()
+    return result
+
+
+def _set_parameters(model: Model, options: TreeOptions) -> None:
+    model.setParam("randomization/randomseedshift", options.seed % 2**31)
+    # One Ctrl-C stops the search and keeps the incumbent.
+    model.setParam("misc/catchctrlc", True)
+    if options.seconds is not None:
+        model.setParam("limits/time", max(0.0, options.seconds))
+    if options.nodes is not None:
+        model.setParam("limits/totalnodes", options.nodes)
+    if options.cutoff is not None:
+        model.setObjlimit(options.cutoff)
+    if not options.presolve:
+        model.setPresolve(SCIP_PARAMSETTING.OFF)
+        model.setParam("presolving/maxrestarts", 0)
+    # Probing takes most of the time on these models and finds next to nothing.
+    model.setParam("propagating/probing/maxprerounds", 0)
+    if not options.scip_separators:
+        model.setSeparating(SCIP_PARAMSETTING.OFF)
+    if not options.heuristics:
+        model.setHeuristics(SCIP_PARAMSETTING.OFF)
+
+
+def _include_adapter(
+    model: Model, separation: Separation | None, values: LpValues, options: TreeOptions
+) -> SeparatorAdapter | None:
+    if separation is None or not separation.separators:
+        return None
+    adapter = SeparatorAdapter(separation, values, options.root_rounds, options.tree_rounds)
+    frequency = options.separate_every
+    model.includeSepa(adapter, "bcut", "separators of bcut", priority=1_000_000, freq=frequency, delay=False)
+    # By default SCIP calls a separator at depths 0, 1, 4, 16, ... whatever its frequency says.
+    model.setParam("separating/bcut/expbackoff", 1)
+    # Rounds are limited per family by the adapter; SCIP's own stalling limits would end them early.
+    model.setParam("separating/maxstallroundsroot", -1)
+    model.setParam("separating/maxroundsroot", -1)
+    return adapter
+
+
+def _add_start(model: Model, variables: list[Variable], start: NDArray[np.integer]) -> None:
+    solution = model.createSol()
+    for variable in variables:
+        model.setSolVal(solution, variable, 0.0)
+    for column in start.tolist():
+        model.setSolVal(solution, variables[column], 1.0)
+    model.addSol(solution)
+
+
+def _optimize(model: Model) -> Exception | None:
+    """Run SCIP; an exception here is either its own or a symptom of one captured in a callback."""
+    try:
+        model.optimize()
+    except Exception as error:
+        return error
+    return None
+
+
+def _collect(model: Model, variables: list[Variable], observer: Observer) -> TreeResult:
+    status = model.getStatus()
+    columns = None
+    if model.getNSols() > 0:
+        best = model.getBestSol()
+        chosen = [column for column, variable in enumerate(variables) if model.getSolVal(best, variable) > 0.5]
+        columns = np.array(chosen, dtype=np.int64)
+    bound = model.getDualbound()
+    outcome: TreeStatus
+    if status == "optimal":
+        outcome = "optimal"
+    elif status in ("infeasible", "inforunbd"):
+        outcome = "infeasible"
+    elif status == "userinterrupt":
+        outcome = "interrupted"
+    elif status in ("timelimit", "nodelimit", "totalnodelimit", "memlimit", "gaplimit", "stallnodelimit"):
+        outcome = "limit"
+    else:
+        raise SolverError(f"SCIP ended with the unexpected status '{status}'")
+    return TreeResult(
+        outcome,
+        columns,
+        None if abs(bound) >= model.infinity() else float(bound),
+        int(model.getNTotalNodes()),
+        observer.rounds,
+    )
+
+
+def scip_version() -> str:
+    """Return the version of the SCIP library, such as "10.0.2"."""
+    model = Model()
+    return f"{model.getMajorVersion()}.{model.getMinorVersion()}.{model.getTechVersion()}"

@@ -1,0 +1,278 @@
+"""What a host does around separators: exact scaling, violation, filters, limits, statistics, error capture."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import gcd, lcm
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
+
+# SCIP's own threshold at the root: violation divided by the Euclidean norm of the coefficients.
+MIN_EFFICACY = 1e-4
+# Larger coefficients make an LP row numerically useless; such cuts are dropped, and counted as found only.
+MAX_COEFFICIENT = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class IntegerCut:
+    """A cut with coprime integer coefficients, ready for a solver: ``coefficients @ x[columns] <= rhs``."""
+
+    family: str
+    columns: NDArray[np.int64]
+    coefficients: NDArray[np.int64]
+    rhs: int
+    proof: Mapping[str, Any]
+
+    @property
+    def key(self) -> tuple[bytes, bytes, int]:
+        """What makes two cuts the same inequality."""
+        return self.columns.tobytes(), self.coefficients.tobytes(), self.rhs
+
+    def violation(self, x: NDArray[np.floating]) -> float:
+        """Return by how much x violates the cut (negative when it satisfies it)."""
+        return float(self.coefficients @ x[self.columns] - self.rhs)
+
+    def efficacy(self, x: NDArray[np.floating]) -> float:
+        """Return the distance from x to the hyperplane of the cut."""
+        return self.violation(x) / float(np.linalg.norm(self.coefficients.astype(float)))
+
+
+@dataclass
+class FamilyStatistics:
+    """What one family did: the entry under ``separators`` of a result file."""
+
+    calls: int = 0
+    found: int = 0
+    added: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits that the host sets on every round.
+
+    Attributes
+    ----------
+    cuts_per_round : int
+        At most this many cuts are handed to the solver per round, the most efficacious first.
+    min_efficacy : float
+        Cuts with a smaller efficacy are dropped.
+    max_parallelism : float
+        A cut whose cosine with an already accepted one of the round exceeds this is dropped.
+    """
+
+    cuts_per_round: int = 500
+    min_efficacy: float = MIN_EFFICACY
+    max_parallelism: float = 0.999
+
+
+def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
+    """Scale a cut to coprime integers and sort it by column.
+
+    Over 0/1 points the left-hand side is then an integer, so the right-hand side is rounded down.
+
+    Raises
+    ------
+    SeparatorError
+        If the cut is malformed: unknown or repeated columns, inexact numbers, lengths that differ.
+    """
+    indices = np.asarray(cut.simplices)
+    if indices.ndim != 1 or not len(indices) or not np.issubdtype(indices.dtype, np.integer):
+        raise SeparatorError(family, f"a cut's simplices must be a non-empty list of columns, not {cut.simplices!r}")
+    if indices.min() < 0 or indices.max() >= columns or len(np.unique(indices)) != len(indices):
+        raise SeparatorError(family, f"a cut's simplices must be distinct columns from 0 to {columns - 1}")
+    given = [1] * len(indices) if cut.coefficients is None else list(cut.coefficients)
+    if len(given) != len(indices):
+        raise SeparatorError(family, f"a cut has {len(indices)} simplices but {len(given)} coefficients")
+    rhs = _exact(cut.rhs, family)
+    exact = [_exact(value, family) for value in given]
+    scale = lcm(*(value.denominator for value in exact))
+    integers = [int(value * scale) for value in exact]
+    divisor = gcd(*integers)
+    if divisor == 0:
+        raise SeparatorError(family, "a cut's coefficients are all zero")
+    order = np.argsort(indices)
+    keep = [int(i) for i in order if integers[i] != 0]
+    return IntegerCut(
+        family,
+        indices[keep].astype(np.int64),
+        np.array([integers[i] // divisor for i in keep], dtype=object).astype(np.int64),
+        int((rhs * scale / divisor).__floor__()),
+        cut.proof,
+    )
+
+
+def _exact(value: Any, family: str) -> Fraction:
+    if isinstance(value, Fraction):
+        return value
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        return Fraction(int(value))
+    raise SeparatorError(
+        family, f"coefficients and right-hand sides are exact (int or Fraction), not {type(value).__name__} {value!r}"
+    )
+
+
+class Separation:
+    """Some separators at work on one problem.
+
+    Parameters
+    ----------
+    separators : sequence of Separator
+        In the order in which they are asked; names must differ.
+    problem : Problem
+    limits : Limits, optional
+    statistics : dict of str to FamilyStatistics, optional
+        Counts to go on from, changed in place.
+
+    Attributes
+    ----------
+    statistics : dict of str to FamilyStatistics
+        Live counts, by family.
+    """
+
+    def __init__(
+        self,
+        separators: Sequence[Separator],
+        problem: Problem,
+        limits: Limits | None = None,
+        *,
+        statistics: dict[str, FamilyStatistics] | None = None,
+    ) -> None:
+        self.separators = list(separators)
+        self.problem = problem
+        self.limits = limits or Limits()
+        self.statistics = {} if statistics is None else statistics
+        check_names(self.separators)
+        for separator in self.separators:
+            self.statistics.setdefault(separator.name, FamilyStatistics())
+        self.known: set[tuple[bytes, bytes, int]] = set()
+        for separator in self.separators:
+            with _guard(separator, "setup", self.statistics[separator.name]):
+                separator.setup(problem)
+
+    def round(self, x: NDArray[np.floating]) -> list[IntegerCut]:
+        """Ask every separator about a point and return the cuts worth adding.
+
+        Parameters
+        ----------
+        x : ndarray of float, shape (m,)
+
+        Returns
+        -------
+        list of IntegerCut
+            Violated, new, not nearly parallel, most efficacious first. The caller confirms what the solver took
+            by `confirm`.
+
+        Raises
+        ------
+        SeparatorError
+            If a separator raises or yields something that is no cut.
+        """
+        point = FractionalPoint(self.problem, x)
+        if point.is_integral:
+            return []
+        candidates: list[IntegerCut] = []
+        for separator in self.separators:
+            statistics = self.statistics[separator.name]
+            statistics.calls += 1
+            with _guard(separator, "separate", statistics):
+                for cut in separator.separate(point):
+                    scaled = to_integers(_checked(cut, separator.name), separator.name, len(x))
+                    if scaled.efficacy(x) > self.limits.min_efficacy:
+                        statistics.found += 1
+                        candidates.append(scaled)
+        return self._select(candidates, x)
+
+    def confirm(self, cut: IntegerCut) -> None:
+        """Record that the solver took a cut: it counts as added and is not offered again."""
+        self.statistics[cut.family].added += 1
+        self.known.add(cut.key)
+
+    def forget(self, cut: IntegerCut) -> None:
+        """Allow a cut to be offered again, after the solver dropped it."""
+        self.known.discard(cut.key)
+
+    def _select(self, candidates: list[IntegerCut], x: NDArray[np.floating]) -> list[IntegerCut]:
+        usable = [cut for cut in candidates if np.abs(cut.coefficients).max() <= MAX_COEFFICIENT]
+        usable.sort(key=lambda cut: cut.efficacy(x), reverse=True)
+        accepted: list[IntegerCut] = []
+        seen = set(self.known)
+        directions = _Directions(len(x))
+        for cut in usable:
+            if len(accepted) >= self.limits.cuts_per_round:
+                break
+            if cut.key in seen or directions.parallel(cut) > self.limits.max_parallelism:
+                continue
+            seen.add(cut.key)
+            directions.add(cut)
+            accepted.append(cut)
+        return accepted
+
+
+def check_names(separators: Sequence[Separator]) -> None:
+    """Refuse two separators of one name: their statistics could not be told apart."""
+    names = [separator.name for separator in separators]
+    for name in names:
+        if names.count(name) > 1:
+            raise SeparatorLoadError(f"separator '{name}' is given twice; give it once, or rename one of the two")
+
+
+class _Directions:
+    """Unit normals of the accepted cuts, indexed by column, so that a cosine costs only shared entries."""
+
+    def __init__(self, columns: int) -> None:
+        self.by_column: dict[int, list[tuple[int, float]]] = {}
+        self.count = 0
+
+    def _unit(self, cut: IntegerCut) -> list[tuple[int, float]]:
+        values = cut.coefficients / np.linalg.norm(cut.coefficients.astype(float))
+        return list(zip(cut.columns.tolist(), values.tolist(), strict=True))
+
+    def add(self, cut: IntegerCut) -> None:
+        for column, value in self._unit(cut):
+            self.by_column.setdefault(column, []).append((self.count, value))
+        self.count += 1
+
+    def parallel(self, cut: IntegerCut) -> float:
+        """Return the largest cosine between the cut and an accepted one."""
+        products = [0.0] * self.count
+        for column, value in self._unit(cut):
+            for other, entry in self.by_column.get(column, ()):
+                products[other] += value * entry
+        return max(products, default=0.0)
+
+
+def _checked(cut: Any, family: str) -> Cut:
+    if not isinstance(cut, Cut):
+        raise SeparatorError(family, f"separate() must yield Cut objects, not {type(cut).__name__}")
+    return cut
+
+
+@dataclass
+class _guard:  # noqa: N801 - used like a function
+    """Time a call into a plug-in; whatever it raises becomes a `SeparatorError` with its own traceback."""
+
+    separator: Separator
+    call: str
+    statistics: FamilyStatistics
+    started: float = field(default=0.0, init=False)
+
+    def __enter__(self) -> None:
+        self.started = time.perf_counter()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
+        self.statistics.seconds += time.perf_counter() - self.started
+        if error is None or isinstance(error, SeparatorError | KeyboardInterrupt):
+            return
+        text = "".join(traceback.format_exception(error))
+        message = f"{self.call}() raised {type(error).__name__}: {error}"
+        raise SeparatorError(self.separator.name, message, text) from error

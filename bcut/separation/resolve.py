@@ -1,0 +1,223 @@
+"""From what a user writes to a separator: a built-in name, a file, or an entry point, with parameters.
+
+``clique``, ``odd-cycle:max_cuts=40,backend=networkx``, ``./my_cuts.py``, ``./my_cuts.py:MyCuts``,
+``./my_cuts.py:MyCuts:depth=3``. An installed package offers separators through the entry-point group ``bcut.separators``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.metadata
+import importlib.util
+import inspect
+import pkgutil
+import sys
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.separation.seam import Separator
+
+GROUP = "bcut.separators"
+
+
+@dataclass(frozen=True)
+class Specification:
+    """A separator as written by a user: where it comes from, which class, which parameters."""
+
+    source: str
+    class_name: str | None = None
+    parameters: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, text: str) -> Specification:
+        """Split ``source[:Class][:name=value,...]``."""
+        source, *rest = text.split(":")
+        # A colon behind a single letter is a drive, not a separator of parts.
+        if len(source) == 1 and rest and rest[0][:1] in ("/", "\\"):
+            source, rest = f"{source}:{rest[0]}", rest[1:]
+        class_name: str | None = None
+        parameters: dict[str, str] = {}
+        for part in rest:
+            if "=" not in part:
+                if class_name is not None or not part.isidentifier():
+                    raise SeparatorLoadError(
+                        f"separator '{text}': cannot read '{part}'; write NAME:parameter=value,... or FILE.py:Class"
+                    )
+                class_name = part
+                continue
+            for item in part.split(","):
+                name, equals, value = item.partition("=")
+                if not equals or not name.strip().isidentifier():
+                    raise SeparatorLoadError(
+                        f"separator '{text}': cannot read the parameter '{item}'; write parameter=value"
+                    )
+                parameters[name.strip()] = value.strip()
+        return cls(source, class_name, parameters)
+
+    @property
+    def is_file(self) -> bool:
+        """Whether the source is a path rather than a name."""
+        return self.source.endswith(".py") or "/" in self.source or "\\" in self.source
+
+
+def resolve(text: str) -> Separator:
+    """Make the separator that a user wrote.
+
+    Raises
+    ------
+    SeparatorLoadError
+        If there is no such separator, the file holds none, or a parameter does not exist or does not fit.
+    SeparatorError
+        If the plug-in's own code raises while it is imported or constructed.
+    """
+    specification = Specification.parse(text)
+    if specification.is_file:
+        family = _class_from_file(specification)
+    else:
+        family = _class_by_name(specification)
+    return _construct(family, specification, text)
+
+
+def built_in_names() -> list[str]:
+    """Return the names of the built-in families: one for each file of `bcut.separators`."""
+    package = importlib.import_module("bcut.separators")
+    return sorted(
+        module.name.replace("_", "-") for module in pkgutil.iter_modules(package.__path__) if module.name[0] != "_"
+    )
+
+
+def available() -> dict[str, type[Separator]]:
+    """Return every separator that can be called by name, built-in ones first."""
+    found = {name: _built_in(name) for name in built_in_names()}
+    for entry in importlib.metadata.entry_points(group=GROUP):
+        found.setdefault(entry.name, _from_entry_point(entry))
+    return found
+
+
+def parameters_of(family: type[Separator]) -> dict[str, Any]:
+    """Return the parameters of a family with their defaults."""
+    signature = inspect.signature(family)
+    return {
+        name: None if parameter.default is inspect.Parameter.empty else parameter.default
+        for name, parameter in signature.parameters.items()
+        if parameter.kind in (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    }
+
+
+def _class_by_name(specification: Specification) -> type[Separator]:
+    name = specification.source
+    if name in built_in_names():
+        return _built_in(name)
+    entries = importlib.metadata.entry_points(group=GROUP)
+    for entry in entries:
+        if entry.name == name:
+            return _from_entry_point(entry)
+    known = [*built_in_names(), *(entry.name for entry in entries)]
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}; a file is given by its path."
+    raise SeparatorLoadError(f"unknown separator '{name}': {hint}")
+
+
+def _built_in(name: str) -> type[Separator]:
+    module = _guarded(name, lambda: importlib.import_module(f"bcut.separators.{name.replace('-', '_')}"))
+    return _only_class(module, name)
+
+
+def _from_entry_point(entry: importlib.metadata.EntryPoint) -> type[Separator]:
+    family = _guarded(entry.name, entry.load)
+    if not (inspect.isclass(family) and issubclass(family, Separator)):
+        raise SeparatorLoadError(f"entry point '{entry.name}' ({entry.value}) is no subclass of bcut.Separator")
+    return family
+
+
+def _class_from_file(specification: Specification) -> type[Separator]:
+    path = Path(specification.source)
+    if not path.is_file():
+        raise SeparatorLoadError(f"separator file {path}: there is no such file")
+    if path.suffix != ".py":
+        raise SeparatorLoadError(f"separator file {path}: not a Python file; its name must end in .py")
+    name = f"bcut_user_separator_{abs(hash(path.resolve()))}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise SeparatorLoadError(f"separator file {path}: Python cannot import it")
+    module = importlib.util.module_from_spec(spec)
+    loader = spec.loader
+    sys.modules[name] = module  # dataclasses and pickling look their module up
+    _guarded(str(path), lambda: loader.exec_module(module))
+    if specification.class_name is None:
+        return _only_class(module, str(path))
+    family = getattr(module, specification.class_name, None)
+    if not (inspect.isclass(family) and issubclass(family, Separator)):
+        raise SeparatorLoadError(f"separator file {path}: it has no class '{specification.class_name}' of bcut.Separator")
+    return family
+
+
+def _only_class(module: ModuleType, source: str) -> type[Separator]:
+    """Return the one concrete separator that a module defines."""
+    families = [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, Separator)
+        and value.__module__ == module.__name__
+        and not inspect.isabstract(value)
+    ]
+    if len(families) == 1:
+        return families[0]
+    if not families:
+        raise SeparatorLoadError(
+            f"separator file {source}: it defines no separator; derive a class from bcut.Separator and give it separate()"
+        )
+    names = ", ".join(family.__name__ for family in families)
+    raise SeparatorLoadError(f"separator file {source}: it defines {names}; say which by {source}:CLASS")
+
+
+def _construct(family: type[Separator], specification: Specification, text: str) -> Separator:
+    known = parameters_of(family)
+    values: dict[str, Any] = {}
+    for name, value in specification.parameters.items():
+        if name not in known:
+            listed = ", ".join(known) or "none"
+            raise SeparatorLoadError(f"separator '{text}': no parameter '{name}'; its parameters are: {listed}")
+        values[name] = _convert(value, known[name], f"separator '{text}': parameter {name}")
+    try:
+        separator = _guarded(text, lambda: family(**values))
+    except SeparatorError as error:
+        # A constructor refuses a value by ValueError: the user's mistake, not the plug-in's.
+        if isinstance(error.__cause__, ValueError):
+            raise SeparatorLoadError(f"separator '{text}': {error.__cause__}") from error
+        raise
+    if not separator.name:
+        raise SeparatorLoadError(f"separator '{text}': class {family.__name__} has no name; set `name = \"my-cuts\"`")
+    return separator
+
+
+def _convert(text: str, default: Any, what: str) -> Any:
+    """Read a parameter as the type of its default."""
+    kind = type(default)
+    if default is None or kind is str:
+        return text
+    if kind is bool:
+        if text.lower() in ("true", "yes", "1", "on"):
+            return True
+        if text.lower() in ("false", "no", "0", "off"):
+            return False
+        raise SeparatorLoadError(f"{what} is true or false, not '{text}'")
+    try:
+        return kind(text)
+    except (TypeError, ValueError):
+        raise SeparatorLoadError(f"{what} is of type {kind.__name__}, not '{text}'") from None
+
+
+def _guarded(source: str, action: Any) -> Any:
+    """Run a plug-in's own code; what it raises becomes a `SeparatorError` with its traceback."""
+    try:
+        return action()
+    except Exception as error:
+        text = "".join(traceback.format_exception(error))
+        raise SeparatorError(source, f"loading it raised {type(error).__name__}: {error}", text) from error

@@ -1,0 +1,162 @@
+"""The separator seam: `Separator`, `Cut`, and the read-only view of a problem that a separator is shown.
+
+A separator knows no solver. It is told about the problem once (`Separator.setup`), and is then shown fractional points
+(`Separator.separate`) and yields inequalities over d-simplices. The host does everything else: it checks violations,
+scales, filters duplicates, limits, times and counts, and names the separator when it raises. The same class
+runs inside SCIP, in the plain cutting-plane loop of ``bcut bound``, and in a test on a hand-made point.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.formulations.formulation import Formulation
+from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.crossings import crossing_matrix
+
+# Values closer than this to 0 or 1 count as integral: SCIP's feasibility tolerance.
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The inequality ``sum of coefficients[i] * x[simplices[i]] <= rhs``.
+
+    Attributes
+    ----------
+    simplices : sequence of int
+        Columns, that is, rows of `Problem.simplices`; none twice.
+    rhs : int or Fraction
+        Exact right-hand side.
+    coefficients : sequence of int or Fraction, optional
+        Exact, one for each simplex; all 1 when omitted.
+    proof : mapping
+        What makes the inequality valid, as JSON-ready data (the clique, the cycle, the face and its weights, ...).
+    """
+
+    simplices: Sequence[int] | NDArray[np.integer]
+    rhs: int | Fraction
+    coefficients: Sequence[int | Fraction] | NDArray[np.integer] | None = None
+    proof: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What a separator may know: the geometry and the program, no solver.
+
+    Attributes
+    ----------
+    formulation : Formulation
+        The program whose relaxation is cut.
+    """
+
+    formulation: Formulation
+
+    @property
+    def configuration(self) -> PointConfiguration:
+        """The point configuration."""
+        return self.formulation.configuration
+
+    @property
+    def chirotope(self) -> Chirotope:
+        """Orientations of all (d+1)-subsets, sides of all (d-1)-simplices."""
+        return self.formulation.chirotope
+
+    @property
+    def simplices(self) -> NDArray[np.int64]:
+        """The d-simplices, one row per variable, shape (m, d + 1), each ascending."""
+        return self.formulation.simplices
+
+    @property
+    def dimension(self) -> int:
+        """The dimension d of the configuration."""
+        return self.chirotope.dimension
+
+    def crossings(
+        self, columns: NDArray[np.integer], others: NDArray[np.integer] | None = None
+    ) -> NDArray[np.bool_]:
+        """Tell which simplices cross, shape (len(columns), len(others)); `others` defaults to `columns`."""
+        rest = None if others is None else self.simplices[others]
+        return crossing_matrix(self.chirotope, self.simplices[columns], rest)
+
+
+class FractionalPoint:
+    """A point x of the relaxation, seen on its support.
+
+    Parameters
+    ----------
+    problem : Problem
+    x : ndarray of float, shape (m,)
+        A value for each d-simplex.
+
+    Attributes
+    ----------
+    x : ndarray of float, shape (m,)
+    support : ndarray of int
+        Columns with a value above the tolerance, ascending.
+    fractional : ndarray of int
+        Those of the support whose value is also below 1 by the tolerance.
+    """
+
+    def __init__(self, problem: Problem, x: NDArray[np.floating]) -> None:
+        self.problem = problem
+        self.x = np.array(x, dtype=float)
+        self.x.setflags(write=False)
+        self.support: NDArray[np.intp] = np.flatnonzero(self.x > TOLERANCE)
+        self.fractional: NDArray[np.intp] = self.support[self.x[self.support] < 1 - TOLERANCE]
+
+    @property
+    def is_integral(self) -> bool:
+        """Whether every value is 0 or 1 up to the tolerance."""
+        return len(self.fractional) == 0
+
+    @cached_property
+    def crossings(self) -> NDArray[np.bool_]:
+        """The crossing graph on `fractional`, as a symmetric matrix without loops."""
+        return self.problem.crossings(self.fractional)
+
+    def value(self, cut: Cut) -> float:
+        """Return the left-hand side of a cut at this point."""
+        values = self.x[np.asarray(cut.simplices, dtype=np.intp)]
+        if cut.coefficients is None:
+            return float(values.sum())
+        return float(values @ np.asarray([float(c) for c in cut.coefficients]))
+
+
+class Separator(ABC):
+    """Base class of all cut families.
+
+    A family is a subclass with a `name`. Its parameters are the keyword arguments of its constructor, each with a
+    default; on the command line they are written ``name:parameter=value,...``.
+
+    Examples
+    --------
+    >>> class NoTwoOf(Separator):
+    ...     name = "no-two-of"
+    ...     def separate(self, point):
+    ...         columns = point.fractional
+    ...         rows, others = point.crossings.nonzero()
+    ...         for i, j in zip(columns[rows], columns[others]):
+    ...             if i < j and point.x[i] + point.x[j] > 1:
+    ...                 yield Cut([i, j], 1, proof={"crossing": [int(i), int(j)]})
+    """
+
+    name: ClassVar[str] = ""
+    problem: Problem
+
+    def setup(self, problem: Problem) -> None:
+        """Prepare for one problem; called once, before the first point."""
+        self.problem = problem
+
+    @abstractmethod
+    def separate(self, point: FractionalPoint) -> Iterable[Cut]:
+        """Yield valid inequalities that the point violates, most useful ones first."""

@@ -1,0 +1,1 @@
+"""The whole way from an instance to a verified result."""

@@ -1,0 +1,181 @@
+"""The state of a solve, and its two kinds of work: bounding at the root, and branching."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.bounds.root import RootBound, RootLimits, Round, root_bound
+from bcut.bounds.safe import SafeBound
+from bcut.formulations.formulation import Formulation
+from bcut.objectives.objective import Objective
+from bcut.result import Status
+from bcut.separation.driver import FamilyStatistics, Separation
+from bcut.separation.seam import Problem, Separator
+
+Progress = Callable[[dict[str, Any]], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A formulation and its objective on some columns of the whole.
+
+    Attributes
+    ----------
+    columns : ndarray of int
+        Where its columns stand in the whole formulation.
+    """
+
+    formulation: Formulation
+    objective: Objective
+    columns: NDArray[np.intp]
+
+    @classmethod
+    def whole(cls, formulation: Formulation, objective: Objective) -> Part:
+        """Return the part that is everything."""
+        return cls(formulation, objective, np.arange(len(formulation.simplices)))
+
+    def restricted_to(self, columns: NDArray[np.intp]) -> Part:
+        """Return the part on some columns of this one."""
+        return Part(
+            self.formulation.restricted_to(columns), self.objective.restricted_to(columns), self.columns[columns]
+        )
+
+
+@dataclass
+class Search:
+    """What a solve knows so far; every stage reads it and adds to it.
+
+    Attributes
+    ----------
+    whole : Part
+    make_separators : callable
+        Returns fresh separators; each part of a solve gets its own.
+    status : str
+        As in a result.
+    columns : ndarray of int or None
+        The best triangulation found.
+    bound : Fraction or None
+        Proven bound on ``sign * objective``.
+    exact : SafeBound or None
+        Exact bound of the relaxation of the whole, without cuts.
+    """
+
+    whole: Part
+    make_separators: Callable[[], list[Separator]]
+    deadline: float | None = None
+    seed: int = 0
+    on_progress: Progress | None = None
+    status: Status = "limit"
+    columns: NDArray[np.intp] | None = None
+    bound: Fraction | None = None
+    exact: SafeBound | None = None
+    lp: float | None = None
+    lp_after_cuts: float | None = None
+    rounds: list[tuple[str, Round]] = field(default_factory=list)
+    columns_after_fixing: int | None = None
+    nodes: int = 0
+    statistics: dict[str, FamilyStatistics] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def sign(self) -> int:
+        """1 for a minimum, -1 for a maximum."""
+        return self.whole.objective.sign
+
+    @property
+    def value(self) -> Fraction | None:
+        """Exact value of the best triangulation found."""
+        return None if self.columns is None else self.whole.objective.value(self.columns)
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Seconds until the deadline, None without one."""
+        return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
+
+    def offer(self, columns: NDArray[np.intp]) -> None:
+        """Keep a triangulation if it is the best so far."""
+        found = self.sign * self.whole.objective.value(columns)
+        if self.value is None or found < self.sign * self.value:
+            self.columns = columns
+
+    def raise_bound(self, bound: Fraction) -> None:
+        """Keep a proven bound on ``sign * objective`` if it is the best so far."""
+        if self.bound is None or bound > self.bound:
+            self.bound = bound
+
+    def report(self, stage: str, **facts: Any) -> None:
+        """Tell whoever watches how far the solve is."""
+        if self.on_progress is not None:
+            value = None if self.value is None else float(self.value)
+            bound = None if self.bound is None else float(self.sign * self.bound)
+            self.on_progress({"stage": stage, "value": value, "bound": bound, **facts})
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time of the block to a stage."""
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - started
+
+    def separation(self, part: Part) -> Separation | None:
+        """Put fresh separators to work on a part; the statistics of all parts add up."""
+        separators = self.make_separators()
+        if not separators:
+            return None
+        return Separation(separators, Problem(part.formulation), statistics=self.statistics)
+
+
+def bound_at_root(
+    search: Search, part: Part, separation: Separation | None, *, target: Fraction | None = None
+) -> RootBound:
+    """Run the cutting-plane loop on a part; keep an integral point as a triangulation.
+
+    Without a deadline the loop ends by itself. With a `target` it ends as soon as the bound exceeds it.
+    """
+
+    def on_round(finished: Round) -> None:
+        search.rounds.append(("root", finished))
+        if search.lp is None:
+            search.lp = finished.lp
+        search.lp_after_cuts = finished.lp
+        search.report("root", lp=finished.lp, cuts=sum(finished.cuts.values()), columns=len(part.columns))
+
+    limits = RootLimits(deadline=search.deadline, target=target)
+    with search.timed("root"):
+        root = root_bound(part.formulation, part.objective, separation, limits=limits, on_round=on_round)
+    if root.status == "integral" and root.point is not None:
+        search.offer(part.columns[root.point > 0.5])
+    return root
+
+
+def branch(search: Search, part: Part, separation: Separation | None, root: RootBound | None, cutoff: float | None) -> str:
+    """Let SCIP search a part; returns its status."""
+    from bcut.scip.host import TreeOptions, branch_and_cut
+
+    options = TreeOptions(seconds=search.seconds_left, seed=search.seed, cutoff=cutoff)
+    cuts = root.cuts if root is not None else []
+
+    def on_progress(facts: dict[str, Any]) -> None:
+        search.report(facts.pop("stage"), columns=len(part.columns), **{"tree_" + k: v for k, v in facts.items()})
+
+    with search.timed("tree"):
+        tree = branch_and_cut(
+            part.formulation, part.objective, separation, options=options, cuts=cuts, on_progress=on_progress
+        )
+    search.nodes += tree.nodes
+    search.rounds.extend(("tree", finished) for finished in tree.rounds)
+    if tree.columns is not None:
+        search.offer(part.columns[tree.columns])
+    if tree.bound is not None and cutoff is None:
+        search.raise_bound(Fraction(part.objective.sign * tree.bound))
+    return tree.status

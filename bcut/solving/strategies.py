@@ -1,0 +1,103 @@
+"""The ways to an optimum: target by target, over all columns at once, or SCIP alone."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import ceil
+from typing import Literal
+
+from bcut.solving.search import Part, Search, bound_at_root, branch
+
+# A value within this relative distance of the bound counts as optimal where values are not integral.
+RELATIVE_GAP = 1e-9
+
+
+def solve_by_targets(search: Search) -> None:
+    """Solve where every triangulation has an integral value.
+
+    The smallest value that the root bound allows is a target. Only columns whose reduced cost is at most target - bound
+    can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP searches what is left. Either a
+    triangulation reaches the target, which is then optimal, or none does, and the target moves up by one.
+    """
+    root = bound_at_root(search, search.whole, None)
+    if root.first is None:
+        return
+    search.exact = root.first
+    search.raise_bound(Fraction(ceil(root.first.value)))
+    while not _is_optimal(search):
+        assert search.bound is not None
+        target = search.bound
+        columns = search.exact.columns_within(target)
+        search.columns_after_fixing = len(columns)
+        outcome = _reach(search, search.whole.restricted_to(columns), target)
+        if outcome == "refuted":
+            search.raise_bound(target + 1)
+        elif outcome != "reached":
+            search.status = outcome
+            return
+    search.status = "optimal"
+
+
+def _is_optimal(search: Search) -> bool:
+    value = search.value
+    return value is not None and search.bound is not None and search.sign * value <= search.bound
+
+
+def _reach(
+    search: Search, part: Part, target: Fraction
+) -> Literal["reached", "refuted", "limit", "interrupted"]:
+    """Look for a triangulation of the target value (times sign) on a part that contains all of them."""
+    separation = search.separation(part)
+    root = bound_at_root(search, part, separation, target=target)
+    if root.status in ("infeasible", "target"):
+        return "refuted"
+    if root.status == "integral":
+        # An optimum of the part: if it misses the target, no triangulation reaches it.
+        return "reached" if _is_optimal(search) else "refuted"
+    if search.seconds_left == 0.0:
+        return "limit"
+    # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target + 1/2.
+    status = branch(search, part, separation, root, float(search.sign * (target + Fraction(1, 2))))
+    if status == "infeasible":
+        return "refuted"
+    return "reached" if _is_optimal(search) else "interrupted" if status == "interrupted" else "limit"
+
+
+def solve_at_once(search: Search) -> None:
+    """Cut the relaxation of all columns, then hand it to SCIP with its cuts: any objective."""
+    separation = search.separation(search.whole)
+    root = bound_at_root(search, search.whole, separation)
+    if root.first is None or root.last is None:
+        return
+    search.exact = root.first
+    search.raise_bound(root.last.value)
+    if root.status == "integral" and _is_close(search):
+        search.status = "optimal"
+        return
+    if search.seconds_left == 0.0:
+        return
+    _finish(search, branch(search, search.whole, separation, root, None))
+
+
+def solve_in_scip(search: Search) -> None:
+    """Leave everything to SCIP and the separators inside it: no root loop of ours, no fixing."""
+    _finish(search, branch(search, search.whole, search.separation(search.whole), None, None))
+
+
+def _is_close(search: Search) -> bool:
+    value, bound = search.value, search.bound
+    if value is None or bound is None:
+        return False
+    return float(search.sign * value - bound) <= RELATIVE_GAP * max(1.0, abs(float(value)))
+
+
+def _finish(search: Search, status: str) -> None:
+    if status == "optimal":
+        search.status = "optimal"
+        # SCIP stops at its own tolerance; its bound is the value then.
+        assert search.value is not None
+        search.raise_bound(search.sign * search.value)
+    elif status == "interrupted":
+        search.status = "interrupted"
+    elif status == "infeasible":
+        search.status = "infeasible"
