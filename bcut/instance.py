@@ -43,8 +43,9 @@ def load_instance(text: str | os.PathLike[str]) -> PointConfiguration:
         return read_points(name)
     head = name.partition(":")[0]
     close = difflib.get_close_matches(head, [*FAMILIES, *instances.names()], n=3)
-    hint = f"did you mean {' or '.join(close)}? " if close else ""
+    if close:
+        raise InputError(f"there is no instance '{name[:80]}'; did you mean {' or '.join(close)}?")
     raise InputError(
-        f"there is no instance '{name[:80]}'; {hint}An instance is a file ({', '.join(SUFFIXES)}), "
+        f"there is no instance '{name[:80]}'; an instance is a file ({', '.join(SUFFIXES)}), "
         f"a bundled name ({', '.join(instances.names())}) or a family ({', '.join(FAMILIES)})"
     )

@@ -87,6 +87,16 @@ class Relaxation:
             raise SolverError("HiGHS refused the model of the relaxation")
         return solver
 
+    def restricted_to(self, columns: NDArray[np.integer]) -> Relaxation:
+        """Return the relaxation on some of its columns, with its cuts; it is solved from scratch."""
+        place = np.full(len(self.formulation.simplices), -1)
+        place[columns] = np.arange(len(columns))
+        smaller = Relaxation(
+            self.formulation.restricted_to(columns), self.objective.restricted_to(columns), deadline=self.deadline
+        )
+        smaller.add([cut.restricted_to(place) for cut in self.cuts])
+        return smaller
+
     def add(self, cuts: Sequence[IntegerCut]) -> None:
         """Add cuts as rows."""
         if not cuts:

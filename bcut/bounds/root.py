@@ -17,6 +17,8 @@ from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut, Separation
 
+# With a target, fixed columns leave the relaxation when no more than this share remains.
+_SHRINK = 0.75
 # Cuts that have been slack for this many rounds leave the relaxation.
 _ROUNDS_SLACK = 4
 _SLACK = 1e-7
@@ -45,7 +47,8 @@ class RootLimits:
     deadline : float, optional
         Value of `time.monotonic`.
     target : Fraction, optional
-        Stop as soon as ``sign * bound`` is proven to exceed it.
+        Only solutions with ``sign * objective <= target`` matter: columns that no such solution can use leave the
+        relaxation, and the loop stops as soon as the bound is proven to exceed it.
     """
 
     rounds: int = 1000
@@ -71,9 +74,16 @@ class RootBound:
         Exact bounds proven by the duals of the first and of the best relaxation (the latter with its cuts).
     point : ndarray of float or None
         The last relaxation point.
+    columns : ndarray of int
+        The columns of the given formulation that the last relaxation still had; fewer than all only with a target.
     cuts : list of IntegerCut
-        The cuts in the last relaxation.
+        The cuts in the last relaxation, over `columns`.
+    separation : Separation or None
+        The separators, at work on `columns`.
     """
+
+    columns: NDArray[np.intp]
+    separation: Separation | None = None
 
     status: Literal["integral", "dry", "stalled", "limit", "target", "infeasible"] = "limit"
     lp: float | None = None
@@ -95,8 +105,8 @@ class _Loop:
         on_round: Callable[[Round], None] | None,
     ) -> None:
         self.relaxation = Relaxation(formulation, objective, deadline=limits.deadline)
-        self.separation, self.limits, self.on_round = separation, limits, on_round
-        self.result = RootBound()
+        self.limits, self.on_round = limits, on_round
+        self.result = RootBound(np.arange(len(formulation.simplices)), separation)
         self.slack_for: dict[tuple[bytes, bytes, int], int] = {}
         self.stalled = 0
 
@@ -127,6 +137,7 @@ class _Loop:
             return False
         self._drop_slack(point)
         self.relaxation.add(cuts)
+        self._shrink()
         return True
 
     def _record(self, point: RelaxationPoint) -> None:
@@ -150,14 +161,14 @@ class _Loop:
             result.status = "target"
         elif self.stalled >= limits.stall_rounds:
             result.status = "stalled"
-        elif self.separation is None or not self.separation.separators:
+        elif result.separation is None or not result.separation.separators:
             result.status = "dry"
         elif len(result.rounds) >= limits.rounds:
             result.status = "limit"
         else:
-            cuts = self.separation.round(point.x)
+            cuts = result.separation.round(point.x)
             for cut in cuts:
-                self.separation.confirm(cut)
+                result.separation.confirm(cut)
             if not cuts:
                 result.status = "dry"
             return cuts
@@ -170,7 +181,7 @@ class _Loop:
 
     def _drop_slack(self, point: RelaxationPoint) -> None:
         """Drop cuts that have been slack for some rounds: they only slow the relaxation down."""
-        assert self.separation is not None
+        assert self.result.separation is not None
         leaving = []
         for position, (cut, slack) in enumerate(zip(self.relaxation.cuts, point.slack, strict=True)):
             age = self.slack_for.get(cut.key, 0) + 1 if slack > _SLACK else 0
@@ -178,8 +189,22 @@ class _Loop:
             if age >= _ROUNDS_SLACK:
                 leaving.append(position)
         for cut in self.relaxation.drop(leaving):
-            self.separation.forget(cut)
+            self.result.separation.forget(cut)
             del self.slack_for[cut.key]
+
+    def _shrink(self) -> None:
+        """Fix the columns that no solution within the target can use, once enough of them have come together."""
+        result = self.result
+        if self.limits.target is None or result.last is None or result.separation is None:
+            return
+        keep = result.last.columns_within(self.limits.target)
+        if len(keep) > _SHRINK * len(result.columns):
+            return
+        self.relaxation = self.relaxation.restricted_to(keep)
+        self.slack_for = {}
+        result.separation = result.separation.restricted_to(keep)
+        result.columns = result.columns[keep]
+        result.last = result.last.restricted_to(keep)
 
 
 def root_bound(

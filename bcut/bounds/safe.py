@@ -10,7 +10,7 @@ tolerances the solver worked with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -49,6 +49,10 @@ class SafeBound:
     multipliers: NDArray[np.int64]
     reduced_costs: NDArray[np.int64]
     shift: int
+
+    def restricted_to(self, columns: NDArray[np.integer]) -> SafeBound:
+        """Return the same bound with the reduced costs of some columns only."""
+        return replace(self, reduced_costs=self.reduced_costs[columns])
 
     def columns_within(self, target: Fraction) -> NDArray[np.intp]:
         """List the columns that a solution with ``sign * objective <= target`` may use (reduced-cost fixing)."""

@@ -56,11 +56,10 @@ def _entries(path: Path, number: int, line: str, delimiter: str | None) -> list[
     if delimiter is None:
         return line.split()
     try:
-        return [
-            entry.strip() for entry in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-        ]
+        entries = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True))
     except csv.Error as error:
         raise InputError(f"{path}: line {number}: {error}") from None
+    return [entry.strip() for entry in entries]
 
 
 def _coordinate(path: Path, number: int, column: int, entry: str) -> Expression:

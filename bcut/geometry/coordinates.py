@@ -184,7 +184,7 @@ def _from_float64(values: npt.NDArray[np.float64]) -> Coordinates:
     )  # a power of two: float64 holds it, and its logarithm is exact
     trailing = np.log2(low_bits.astype(np.float64)).astype(np.int64)
     mantissas >>= trailing
-    shifts = np.where(mantissas == 0, 0, shifts + trailing)
+    shifts += trailing
     scale = max(0, int(-shifts.min(initial=0)))
     lifts = shifts + scale
     bits = np.frexp(np.abs(mantissas).astype(np.float64))[1] + lifts

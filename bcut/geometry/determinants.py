@@ -9,7 +9,7 @@ Three tiers, each exact on what it decides:
 
 from __future__ import annotations
 
-from math import factorial
+from math import factorial, prod
 from typing import Any
 
 import numpy as np
@@ -89,39 +89,41 @@ class _Kernel:
         # Centred numerators: a translation changes no determinant and makes the entries small.
         numerators = configuration.numerators.astype(object)
         numerators = numerators - numerators[0]
-        largest = max(1, max(abs(int(v)) for v in numerators.flat))
+        # Differences are at most twice these. A term of a determinant has one factor from each column, and a product in
+        # the field multiplies bounds by the sum of |structure|, which itself may exceed 64 bits.
+        largest = np.abs(numerators).max(axis=(0, 2), initial=1)
         degree = self.field.degree
-        # Differences are at most 2*largest. A product in the field multiplies bounds by the sum of |structure|.
-        growth = 1 if degree == 1 else int(np.abs(self.field.structure).sum(axis=(0, 1)).max())
-        exact_in_64_bits = factorial(d) * (2 * largest) ** d * growth ** (d - 1) < 2**62
+        growth = 1 if degree == 1 else int(np.abs(self.field.structure).astype(object).sum(axis=(0, 1)).max())
+        bound = factorial(d) * prod(2 * int(value) for value in largest) * growth ** (d - 1)
+        exact_in_64_bits = bound < 2**62
         self.numerators = numerators.astype(np.int64) if exact_in_64_bits else numerators
         self.integers_decide = exact_in_64_bits and degree == 1
         if not self.integers_decide:
-            self._prepare_filter(numerators)
+            self._prepare_filter(numerators, largest)
 
-    def _prepare_filter(self, numerators: NDArray[np.object_]) -> None:
-        """Scale the points into [-1, 1] and bound the error of a determinant of their differences.
+    def _prepare_filter(self, numerators: NDArray[np.object_], largest: NDArray[np.object_]) -> None:
+        """Scale each coordinate into [-1, 1] and bound the error of a determinant of differences.
 
-        With u = 2**-53 and a field of degree r: a scaled coordinate is a sum of at most r terms, each off by at most 3u
-        relative (conversion, basis number, product), summed and scaled with another r + 1 roundings, so it is
-        within (4 + r)u of the exact one. A difference is at most 2 in size and within (10 + 2r)u. The determinant is a
-        sum of d! products of d such entries, each through at most 2d roundings. To first order the error is at most
-        ``d! 2**d d (5 + r) u`` from the entries plus ``d! 2**d 2d u`` from the arithmetic; the factor 8(r + 1) below
-        exceeds 7 + r by enough to cover the higher orders.
+        Scaling a coordinate, at all points alike, changes no sign. With u = 2**-53 and a field of degree r: a scaled
+        coordinate is a sum of at most r terms, each off by at most 3u relative (conversion, basis number, product),
+        summed and scaled with another r roundings, so it is within (3 + r)u of the exact one. A difference is at most 2
+        in size and within (8 + 2r)u. The determinant is a sum of d! products of d such entries; each product goes
+        through d - 1 multiplications and, a minor of size k having k terms, at most 1 + 2 + ... + (d - 1) additions. To
+        first order the error is at most ``d! 2**d d (4 + r) u`` from the entries plus ``d! 2**d d (d + 1)/2 u`` from the
+        arithmetic; the bound below is twice that, which covers the higher orders.
         """
         d, degree = self.dimension, self.field.degree
-        scale = max(1, max(abs(int(v)) for v in numerators.flat))
-        # Exact integers divided exactly, then rounded once: Python's true division of integers rounds correctly.
-        scaled = np.array([int(v) / scale for v in numerators.flat], dtype=float).reshape(numerators.shape)
-        spread = 1.0
+        scales = np.broadcast_to(largest[None, :, None], numerators.shape)
+        # Python's true division of integers, of any size, rounds correctly.
+        scaled = np.true_divide(numerators, scales).astype(float)
         if degree > 1:
-            basis = np.asarray(self.field.basis_floats, dtype=float)
-            spread = float(np.abs(scaled * basis).sum(axis=-1).max()) or 1.0
-            scaled = (scaled * basis).sum(axis=-1) / spread
+            terms = scaled * self.field.basis_floats
+            spread = np.abs(terms).sum(axis=-1).max(axis=0)
+            scaled = terms.sum(axis=-1) / np.where(spread > 0, spread, 1.0)
         else:
             scaled = scaled[..., 0]
         self.scaled = scaled
-        self.error_bound = factorial(d) * 2.0**d * 8.0 * d * (degree + 1) * _UNIT_ROUNDOFF
+        self.error_bound = factorial(d) * 2.0**d * d * (2 * (4 + degree) + d + 1) * _UNIT_ROUNDOFF
 
     def signs(self, tuples: NDArray[np.integer]) -> Signs:
         if self.integers_decide:

@@ -58,9 +58,9 @@ class _Growth:
 
     def _basis(self, order: list[int]) -> list[int]:
         """Return the first affine basis in the order: each point that is not in the span of those before it."""
-        rank_of = {point: place for place, point in enumerate(order)}
-        places = np.vectorize(rank_of.__getitem__)(self.chirotope.bases)
-        places.sort(axis=1)
+        place_of = np.empty(len(order), dtype=np.int64)
+        place_of[order] = np.arange(len(order))
+        places = np.sort(place_of[self.chirotope.bases], axis=1)
         first = places[np.lexsort(places.T[::-1])[0]]
         return [order[place] for place in first]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import gcd, lcm
 from typing import Any
@@ -36,6 +36,17 @@ class IntegerCut:
     def key(self) -> tuple[bytes, bytes, int]:
         """What makes two cuts the same inequality."""
         return self.columns.tobytes(), self.coefficients.tobytes(), self.rhs
+
+    def restricted_to(self, place: NDArray[np.integer]) -> IntegerCut:
+        """Return the cut after other columns were fixed to 0.
+
+        Parameters
+        ----------
+        place : ndarray of int, shape (old number of columns,)
+            New column of each old one, -1 for those that were fixed.
+        """
+        kept = place[self.columns] >= 0
+        return replace(self, columns=place[self.columns[kept]], coefficients=self.coefficients[kept])
 
     def violation(self, x: NDArray[np.floating]) -> float:
         """Return by how much x violates the cut (negative when it satisfies it)."""
@@ -158,6 +169,11 @@ class Separation:
         for separator in self.separators:
             with _guard(separator, "setup", self.statistics[separator.name]):
                 separator.setup(problem)
+
+    def restricted_to(self, columns: NDArray[np.integer]) -> Separation:
+        """Put the same separators to work on some of the columns; the statistics go on."""
+        problem = Problem(self.problem.formulation.restricted_to(columns))
+        return Separation(self.separators, problem, self.limits, statistics=self.statistics)
 
     def round(self, x: NDArray[np.floating]) -> list[IntegerCut]:
         """Ask every separator about a point and return the cuts worth adding.

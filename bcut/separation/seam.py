@@ -9,10 +9,12 @@ runs inside SCIP, in the plain cutting-plane loop of ``bcut bound``, and in a te
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from math import factorial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,10 +23,13 @@ from numpy.typing import NDArray
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
-from bcut.geometry.crossings import crossing_matrix
+from bcut.geometry.crossings import CrossingTable, crossing_matrix
 
 # Values closer than this to 0 or 1 count as integral: SCIP's feasibility tolerance.
 TOLERANCE = 1e-6
+
+# Rows of the crossing graph that a problem remembers, in bytes: a row is one bit per column.
+_ROW_CACHE = 1 << 27
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,39 @@ class Problem:
         """Tell which simplices cross, shape (len(columns), len(others)); `others` defaults to `columns`."""
         rest = None if others is None else self.simplices[others]
         return crossing_matrix(self.chirotope, self.simplices[columns], rest)
+
+    def crossing_rows(self, columns: NDArray[np.integer]) -> NDArray[np.bool_]:
+        """Tell which of all simplices cross each of some, shape (len(columns), m).
+
+        Rows are remembered, because separators come back to the same simplices from round to round.
+        """
+        asked = np.asarray(columns).tolist()
+        missing = [column for column in dict.fromkeys(asked) if column not in self._rows]
+        if missing:
+            computed = np.packbits(self._crossing_table.rows(self.simplices[missing]), axis=1)
+            self._rows.update(zip(missing, computed, strict=True))
+        for column in asked:
+            self._rows.move_to_end(column)
+        width = (len(self.simplices) + 7) // 8
+        packed = np.array([self._rows[column] for column in asked], dtype=np.uint8).reshape(-1, width)
+        while len(self._rows) > max(1, _ROW_CACHE // width):
+            self._rows.popitem(last=False)
+        return np.unpackbits(packed, axis=1, count=len(self.simplices)).view(np.bool_)
+
+    @cached_property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volumes of all simplices in floating point, shape (m,): to rank them, never to decide."""
+        corners = self.configuration.floats[self.simplices]
+        edges = corners[:, 1:] - corners[:, :1]
+        return np.abs(np.linalg.det(edges)) / factorial(self.dimension)
+
+    @cached_property
+    def _crossing_table(self) -> CrossingTable:
+        return CrossingTable(self.chirotope, self.simplices)
+
+    @cached_property
+    def _rows(self) -> OrderedDict[int, NDArray[np.uint8]]:
+        return OrderedDict()
 
 
 class FractionalPoint:

@@ -29,7 +29,7 @@ from bcut.solving.certificates import make_certificate, rounded
 from bcut.solving.search import Part, Progress, Search, bound_at_root
 from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_scip
 
-DEFAULT_SEPARATORS = ("clique", "odd-cycle")
+DEFAULT_SEPARATORS = ("link",)
 FORMULATIONS: dict[str, Callable[..., Formulation]] = {"2": cocircuit_formulation}
 METHODS = ("auto", "scip")
 

@@ -148,34 +148,49 @@ def bound_at_root(
         if search.lp is None:
             search.lp = finished.lp
         search.lp_after_cuts = finished.lp
-        search.report("root", lp=finished.lp, cuts=sum(finished.cuts.values()), columns=len(part.columns))
+        search.report("root", lp=finished.lp, cuts=sum(finished.cuts.values()))
 
     limits = RootLimits(deadline=search.deadline, target=target)
     with search.timed("root"):
         root = root_bound(part.formulation, part.objective, separation, limits=limits, on_round=on_round)
     if root.status == "integral" and root.point is not None:
-        search.offer(part.columns[root.point > 0.5])
+        search.offer(part.columns[root.columns[root.point > 0.5]])
     return root
 
 
-def branch(search: Search, part: Part, separation: Separation | None, root: RootBound | None, cutoff: float | None) -> str:
-    """Let SCIP search a part; returns its status."""
+def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float | None = None) -> str:
+    """Let SCIP search a part, with the cuts and separators of its root bound; returns SCIP's status.
+
+    Parameters
+    ----------
+    search : Search
+    part : Part
+    root : RootBound or None
+        Of this part. Without it the separators start anew.
+    cutoff : float, optional
+        Only triangulations strictly better than this are wanted.
+    """
     from bcut.scip.host import TreeOptions, branch_and_cut
 
+    if root is None:
+        separation, cuts = search.separation(part), []
+    else:
+        separation, cuts = root.separation, root.cuts
+        part = part.restricted_to(root.columns)
     options = TreeOptions(seconds=search.seconds_left, seed=search.seed, cutoff=cutoff)
-    cuts = root.cuts if root is not None else []
-
-    def on_progress(facts: dict[str, Any]) -> None:
-        search.report(facts.pop("stage"), columns=len(part.columns), **{"tree_" + k: v for k, v in facts.items()})
-
     with search.timed("tree"):
         tree = branch_and_cut(
-            part.formulation, part.objective, separation, options=options, cuts=cuts, on_progress=on_progress
+            part.formulation,
+            part.objective,
+            separation,
+            options=options,
+            cuts=cuts,
+            on_progress=lambda facts: search.report("tree", columns=len(part.columns), nodes=facts["nodes"]),
         )
     search.nodes += tree.nodes
     search.rounds.extend(("tree", finished) for finished in tree.rounds)
     if tree.columns is not None:
         search.offer(part.columns[tree.columns])
     if tree.bound is not None and cutoff is None:
-        search.raise_bound(Fraction(part.objective.sign * tree.bound))
+        search.raise_bound(Fraction(search.sign * tree.bound))
     return tree.status

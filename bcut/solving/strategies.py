@@ -28,7 +28,6 @@ def solve_by_targets(search: Search) -> None:
         assert search.bound is not None
         target = search.bound
         columns = search.exact.columns_within(target)
-        search.columns_after_fixing = len(columns)
         outcome = _reach(search, search.whole.restricted_to(columns), target)
         if outcome == "refuted":
             search.raise_bound(target + 1)
@@ -47,8 +46,8 @@ def _reach(
     search: Search, part: Part, target: Fraction
 ) -> Literal["reached", "refuted", "limit", "interrupted"]:
     """Look for a triangulation of the target value (times sign) on a part that contains all of them."""
-    separation = search.separation(part)
-    root = bound_at_root(search, part, separation, target=target)
+    root = bound_at_root(search, part, search.separation(part), target=target)
+    search.columns_after_fixing = len(root.columns)
     if root.status in ("infeasible", "target"):
         return "refuted"
     if root.status == "integral":
@@ -57,7 +56,7 @@ def _reach(
     if search.seconds_left == 0.0:
         return "limit"
     # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target + 1/2.
-    status = branch(search, part, separation, root, float(search.sign * (target + Fraction(1, 2))))
+    status = branch(search, part, root, cutoff=float(search.sign * (target + Fraction(1, 2))))
     if status == "infeasible":
         return "refuted"
     return "reached" if _is_optimal(search) else "interrupted" if status == "interrupted" else "limit"
@@ -65,8 +64,7 @@ def _reach(
 
 def solve_at_once(search: Search) -> None:
     """Cut the relaxation of all columns, then hand it to SCIP with its cuts: any objective."""
-    separation = search.separation(search.whole)
-    root = bound_at_root(search, search.whole, separation)
+    root = bound_at_root(search, search.whole, search.separation(search.whole))
     if root.first is None or root.last is None:
         return
     search.exact = root.first
@@ -76,12 +74,12 @@ def solve_at_once(search: Search) -> None:
         return
     if search.seconds_left == 0.0:
         return
-    _finish(search, branch(search, search.whole, separation, root, None))
+    _finish(search, branch(search, search.whole, root))
 
 
 def solve_in_scip(search: Search) -> None:
     """Leave everything to SCIP and the separators inside it: no root loop of ours, no fixing."""
-    _finish(search, branch(search, search.whole, search.separation(search.whole), None, None))
+    _finish(search, branch(search, search.whole, None))
 
 
 def _is_close(search: Search) -> bool:

@@ -1,0 +1,1 @@
+"""The command line: thin commands around library functions of the same names."""

@@ -1,0 +1,27 @@
+"""`bcut bound`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from bcut.cli.options import instance_argument, objective_options, report_options, run_options, separator_options
+from bcut.cli.running import carry_out
+
+
+@click.command(short_help="Bound the optimum at the root, before and after cuts.")
+@instance_argument
+@objective_options
+@separator_options
+@run_options
+@report_options
+def bound(**options: Any) -> int:
+    """Bound the optimum of INSTANCE at the root, before and after the cuts of the separators given.
+
+    There is no branching, and none of the solver's own cuts are used, so the difference is what the separators did. The
+    result has the same form as that of `bcut solve`, with no triangulation.
+    """
+    from bcut.solving.api import bound as call
+
+    return carry_out(call, **options)

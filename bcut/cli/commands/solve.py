@@ -1,0 +1,36 @@
+"""`bcut solve`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from bcut.cli.options import instance_argument, objective_options, report_options, run_options, separator_options
+from bcut.cli.running import carry_out
+
+
+@click.command(short_help="Find an optimal triangulation.")
+@instance_argument
+@objective_options
+@separator_options
+@click.option(
+    "--method",
+    type=click.Choice(["auto", "scip"]),
+    default="auto",
+    show_default=True,
+    help="auto: bound and fix at the root, then branch on what is left. scip: leave everything to SCIP.",
+)
+@run_options
+@report_options
+def solve(**options: Any) -> int:
+    """Find an optimal triangulation of INSTANCE and prove it optimal.
+
+    INSTANCE is a file of points or a member of a family (`bcut generate --list`). The triangulation is verified exactly
+    before it is reported. Exit status 0: solved (or proven that there is no such triangulation); 3: a limit came first,
+    and what was found is still written; 5: a separator or the solver failed; 130: interrupted, with what was found
+    still written.
+    """
+    from bcut.solving.api import solve as call
+
+    return carry_out(call, **options)

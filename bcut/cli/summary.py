@@ -1,0 +1,65 @@
+"""A result as a few lines for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bcut.cli.output import table
+from bcut.result import Result
+
+_MEANING = {
+    "optimal": "optimal (proven)",
+    "infeasible": "infeasible: there is no such triangulation (proven)",
+    "limit": "a limit came first",
+    "interrupted": "interrupted",
+    "bound": "bound at the root",
+}
+
+
+def summary(result: Result, output: Path | None = None) -> str:
+    """Return the summary of a result, and where it was written, with a line break at the end."""
+    instance, problem, size = result.instance, result.problem, result.size
+    head = f"{instance.name}: {len(instance.points)} points in dimension {instance.dimension}\n"
+    kind = "spanning triangulations" if problem.spanning else "triangulations"
+    columns = f"{size.columns:,} columns, {size.rows:,} rows"
+    if size.columns_after_fixing is not None:
+        columns += f"; {size.columns_after_fixing:,} columns after fixing"
+    rows = [
+        ("problem", f"{problem.sense} {problem.objective} over all {kind}"),
+        ("program", f"formulation {problem.formulation}: {columns}"),
+        ("root LP", f"{_number(result.root.lp)}, after cuts {_number(result.root.lp_after_cuts)}"),
+        ("value", _number(result.value)),
+        ("bound", _number(result.bound)),
+        ("status", _status(result)),
+        ("nodes", f"{result.nodes:,}"),
+        *_separators(result),
+        ("time", _times(result.seconds)),
+    ]
+    if result.status == "bound":
+        rows = [row for row in rows if row[0] not in ("value", "nodes")]
+    if output is not None:
+        rows.append(("written", str(output)))
+    return head + table(rows)
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.10g}"
+
+
+def _status(result: Result) -> str:
+    text = _MEANING.get(result.status, result.status)
+    return text if not result.gap else f"{text}; gap {100 * result.gap:.2f} %"
+
+
+def _separators(result: Result) -> list[tuple[str, str]]:
+    lines = [
+        f"{name}: {family['calls']} calls, {family['found']} cuts found, {family['added']} added, "
+        f"{family['seconds']:.2f} s"
+        for name, family in result.separators.items()
+    ]
+    return [("separators" if number == 0 else "", line) for number, line in enumerate(lines)]
+
+
+def _times(seconds: dict[str, float]) -> str:
+    stages = ", ".join(f"{stage} {spent:.2f}" for stage, spent in seconds.items() if stage != "total")
+    return f"{seconds.get('total', 0.0):.2f} s ({stages})"

@@ -1,0 +1,280 @@
+"""Re-computing the bound that exact dual multipliers prove, over every candidate simplex.
+
+Let sign be 1 for a minimum and -1 for a maximum, and x the 0/1 vector of a triangulation, indexed by the
+candidate simplices. It satisfies
+
+- for a (d-1)-simplex f with points strictly on both sides: the sum over t = f + a of x_t times the sign of
+  ``det(f_1 - f_0, ..., f_{d-1} - f_0, a - f_0)`` is 0, because as many simplices (one or none) lie on either
+  side of f;
+- the coverage row: the sum of x_t over the t that contain one generic point is 1;
+- the cuts ``a x <= rhs``, as far as they are valid.
+
+Hence for any multipliers y of the equations and any multipliers z <= 0 of the cuts
+
+    sign * c x >= y_coverage + sum_k z_k rhs_k + sum_t min(0, sign * c_t - sum_i y_i A_it - sum_k z_k a_kt),
+
+since 0 <= x_t <= 1. The generic point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` for the flag v and
+an infinitesimal e > 0: it is on the side of a hyperplane on which the first of v_0, v_1, ... lies that is
+not on the hyperplane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations, islice
+from math import comb, lcm
+
+from bcut.errors import VerificationError
+from bcut.verification.costs import Costs
+from bcut.verification.cuts import CUT_CHECKERS, CertificateCut
+from bcut.verification.exact_points import ExactPoints, SideTable, Simplex, mask_of, without
+
+# Subsets of d + 1 points to look at, unless told otherwise: some minutes' work.
+MAX_SUBSETS = 20_000_000
+
+# Simplices whose costs are asked for at once.
+_CHUNK = 1 << 16
+
+
+@dataclass(frozen=True)
+class CertificateData:
+    """Multipliers as read from a result file.
+
+    Attributes
+    ----------
+    bound : Fraction or None
+        The claim, on the objective itself; None where the file claims nothing.
+    flag : tuple of int
+        v_0, ..., v_d.
+    coverage : Fraction
+        Multiplier of the coverage row.
+    cocircuits : mapping of tuple of int to Fraction
+        Multipliers of the rows of ascending (d-1)-simplices.
+    cuts : tuple of CertificateCut
+    reason : str
+        Why there is no bound.
+    """
+
+    bound: Fraction | None
+    flag: Simplex = ()
+    coverage: Fraction = Fraction(0)
+    cocircuits: Mapping[Simplex, Fraction] | None = None
+    cuts: tuple[CertificateCut, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class CertifiedBound:
+    """What a certificate proves.
+
+    Attributes
+    ----------
+    bound : Fraction or None
+        No triangulation has a better value; None where `obstacle` kept the bound from being re-computed.
+    integral : bool
+        Whether all candidate simplices have integral costs, so that the bound may be rounded.
+    candidates : int
+        Number of candidate simplices.
+    obstacle : str
+        Why the bound could not be re-computed.
+    """
+
+    bound: Fraction | None
+    integral: bool = False
+    candidates: int = 0
+    obstacle: str = ""
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether the bound was re-computed."""
+        return self.bound is not None
+
+
+def certified_bound(
+    points: ExactPoints,
+    certificate: CertificateData,
+    costs: Costs,
+    *,
+    sense: str,
+    spanning: bool,
+    max_subsets: int = MAX_SUBSETS,
+) -> CertifiedBound:
+    """Re-compute the bound of a certificate exactly.
+
+    Parameters
+    ----------
+    points : ExactPoints
+    certificate : CertificateData
+    costs : Costs
+    sense : {"min", "max"}
+    spanning : bool
+        Candidates are the simplices without further points in them, instead of all.
+    max_subsets : int
+        Give up, with an obstacle, where more (d+1)-subsets would have to be looked at.
+
+    Returns
+    -------
+    CertifiedBound
+
+    Raises
+    ------
+    VerificationError
+        A row or a cut is not valid, or the multipliers prove less than the certificate claims.
+    """
+    subsets = comb(points.n, points.dimension + 1)
+    if subsets > max_subsets:
+        return CertifiedBound(
+            None, obstacle=f"there are {subsets:,} subsets of {points.dimension + 1} points to look at"
+        )
+    sides = SideTable(points)
+    _check_rows(sides, certificate)
+    unknown = sorted(
+        {cut.family for cut in certificate.cuts if cut.multiplier and cut.family not in CUT_CHECKERS}
+    )
+    if unknown:
+        return CertifiedBound(None, obstacle=f"it uses cuts that cannot be re-checked ({', '.join(unknown)})")
+    _check_cuts(sides, certificate)
+    found = _Program(sides, certificate, costs, 1 if sense == "min" else -1, spanning).solve()
+    claim = certificate.bound
+    assert found.bound is not None
+    if claim is not None and (found.bound < claim if sense == "min" else found.bound > claim):
+        raise VerificationError(
+            f"the certificate claims the bound {claim}, but its multipliers prove {found.bound} only "
+            f"({'at least' if sense == 'min' else 'at most'} {float(found.bound):.6g})"
+        )
+    return found
+
+
+def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
+    n, d = sides.points.n, sides.points.dimension
+    flag = certificate.flag
+    if len(set(flag)) != d + 1 or len(flag) != d + 1 or not all(0 <= v < n for v in flag):
+        raise VerificationError(
+            f"the certificate's flag {list(flag)} is not a list of {d + 1} different points"
+        )
+    if not sides.orientation(tuple(sorted(flag))):
+        raise VerificationError(
+            f"the certificate's flag {list(flag)} lies in a hyperplane: it gives no generic point"
+        )
+    for facet in certificate.cocircuits or {}:
+        if len(facet) != d or not all(0 <= v < n for v in facet):
+            raise VerificationError(f"the certificate's row {list(facet)} does not name {d} points")
+        plus, minus = sides[facet]
+        if not (plus and minus):
+            raise VerificationError(
+                f"the certificate has a multiplier for {list(facet)}, "
+                "which has no points strictly on both sides: there is no such row"
+            )
+
+
+def _check_cuts(sides: SideTable, certificate: CertificateData) -> None:
+    n, d = sides.points.n, sides.points.dimension
+    for number, cut in enumerate(certificate.cuts):
+        if not cut.multiplier:
+            continue
+        where = f"cut {number} of the certificate ({cut.family})"
+        if cut.multiplier > 0:
+            raise VerificationError(
+                f"{where}: multiplier {cut.multiplier} of a '<=' row must not be positive"
+            )
+        for simplex in cut.simplices:
+            if len(simplex) != d + 1 or not all(0 <= v < n for v in simplex):
+                raise VerificationError(f"{where}: {list(simplex)} does not name {d + 1} points")
+        try:
+            CUT_CHECKERS[cut.family](sides, cut)
+        except VerificationError as error:
+            raise VerificationError(f"{where} is not valid: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Facet:
+    """What the candidates need to know of each of their facets, as bit sets of points.
+
+    Attributes
+    ----------
+    plus, minus : int
+        Points strictly on either side.
+    generic : int
+        Points strictly on the side of the generic point.
+    multiplier : int
+        Scaled to an integer.
+    """
+
+    plus: int
+    minus: int
+    generic: int
+    multiplier: int
+
+
+class _Program:
+    """The sum over all candidate simplices, with all multipliers over one denominator."""
+
+    def __init__(
+        self, sides: SideTable, certificate: CertificateData, costs: Costs, sign: int, spanning: bool
+    ) -> None:
+        self.sides, self.costs, self.sign, self.spanning = sides, costs, sign, spanning
+        cocircuits = certificate.cocircuits or {}
+        in_cuts: dict[Simplex, Fraction] = {}
+        constant = certificate.coverage
+        for cut in certificate.cuts:
+            constant += cut.multiplier * cut.rhs
+            for simplex, coefficient in zip(cut.simplices, cut.coefficients, strict=True):
+                in_cuts[simplex] = in_cuts.get(simplex, Fraction(0)) + cut.multiplier * coefficient
+        values = (constant, certificate.coverage, *cocircuits.values(), *in_cuts.values())
+        self.scale = lcm(*(value.denominator for value in values))
+        self.constant = int(constant * self.scale)
+        self.coverage = int(certificate.coverage * self.scale)
+        self.in_cuts = {simplex: int(value * self.scale) for simplex, value in in_cuts.items()}
+        self.facets = {
+            facet: self._facet(facet, certificate.flag, int(cocircuits.get(facet, Fraction(0)) * self.scale))
+            for facet in combinations(range(sides.points.n), sides.points.dimension)
+        }
+
+    def _facet(self, facet: Simplex, flag: Simplex, multiplier: int) -> _Facet:
+        plus, minus = self.sides[facet]
+        for vertex in flag:
+            if plus >> vertex & 1:
+                return _Facet(plus, minus, plus, multiplier)
+            if minus >> vertex & 1:
+                return _Facet(plus, minus, minus, multiplier)
+        return _Facet(plus, minus, 0, multiplier)  # the points of the facet are affinely dependent
+
+    def solve(self) -> CertifiedBound:
+        """Add up what each candidate can contribute at most."""
+        total: int | Fraction = self.constant
+        count, integral = 0, True
+        activities = self._activities()
+        while chunk := list(islice(activities, _CHUNK)):
+            count += len(chunk)
+            costs = self.costs.of([simplex for simplex, _ in chunk])
+            for (_, activity), cost in zip(chunk, costs, strict=True):
+                reduced = self.sign * self.scale * cost - activity
+                if reduced < 0:
+                    total += reduced
+                integral = integral and cost.denominator == 1
+        bound = self.sign * Fraction(total) / self.scale
+        return CertifiedBound(bound, integral or self.costs.integral, count)
+
+    def _activities(self) -> Iterator[tuple[Simplex, int]]:
+        """Yield each candidate with the sum of multiplier times coefficient over all rows and cuts."""
+        points = self.sides.points
+        everything = (1 << points.n) - 1
+        facets, in_cuts, coverage, spanning = self.facets, self.in_cuts, self.coverage, self.spanning
+        for simplex in combinations(range(points.n), points.dimension + 1):
+            last = facets[simplex[:-1]]
+            if not (last.plus | last.minus) >> simplex[-1] & 1:
+                continue
+            activity = in_cuts.get(simplex, 0)
+            inside, covers = everything, True
+            for position, vertex in enumerate(simplex):
+                facet = facets[without(simplex, position)]
+                on_plus = facet.plus >> vertex & 1
+                covers = covers and bool(facet.generic >> vertex & 1)
+                inside &= ~(facet.minus if on_plus else facet.plus)
+                if facet.multiplier:
+                    activity += facet.multiplier if on_plus else -facet.multiplier
+            if spanning and inside != mask_of(simplex):
+                continue
+            yield simplex, activity + coverage if covers else activity

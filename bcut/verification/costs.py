@@ -1,0 +1,98 @@
+"""Exact costs of simplices, from what a result file says of its objective."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from bcut.errors import ResultError
+from bcut.verification.exact_points import Simplex
+
+if TYPE_CHECKING:
+    from bcut.geometry.configuration import PointConfiguration
+
+Cost = int | Fraction
+
+
+@dataclass(frozen=True)
+class CostTable:
+    """The costs that a result file embeds: a default, and exceptions by ascending vertices."""
+
+    default: Fraction
+    costs: Mapping[Simplex, Fraction]
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Exact costs of simplices.
+
+    Attributes
+    ----------
+    of : callable
+        Maps a list of ascending simplices to their costs.
+    integral : bool
+        Whether every simplex is known to have an integral cost, even those that nobody has looked at.
+    """
+
+    of: Callable[[Sequence[Simplex]], Sequence[Cost]]
+    integral: bool
+
+
+def costs_of_objective(objective: str, table: CostTable | None, configuration: PointConfiguration) -> Costs:
+    """Return the costs that an objective stands for.
+
+    The number of simplices is counted here, and embedded tables are looked up here. Other measures are
+    evaluated by the functions registered for them, at the simplices in question.
+
+    Parameters
+    ----------
+    objective : str
+        As in a result file: the name of a measure, with its argument behind a colon.
+    table : CostTable, optional
+        For ``costs:FILE``; the file itself is not read.
+    configuration : PointConfiguration
+
+    Raises
+    ------
+    ResultError
+        There is no such measure.
+    InputError
+        Its argument does not fit.
+    """
+    if objective == "cardinality":
+        return Costs(lambda simplices: [1] * len(simplices), integral=True)
+    if objective.partition(":")[0] == "costs":
+        if table is None:
+            raise ResultError(
+                f"problem.costs is missing, so the values of objective '{objective}' cannot be re-computed; "
+                "solve the instance again, then the table of costs is written into the result"
+            )
+        integral = all(cost.denominator == 1 for cost in (table.default, *table.costs.values()))
+        return Costs(
+            lambda simplices: [table.costs.get(simplex, table.default) for simplex in simplices], integral
+        )
+    return Costs(_registered_measure(objective, configuration), integral=False)
+
+
+def _registered_measure(
+    objective: str, configuration: PointConfiguration
+) -> Callable[[Sequence[Simplex]], Sequence[Cost]]:
+    import numpy as np
+
+    from bcut.objectives.measures import MEASURES
+
+    name, _, argument = objective.partition(":")
+    if name not in MEASURES:
+        raise ResultError(
+            f"problem.objective is '{objective}', a measure that this version does not know; "
+            "verify the result with the version of bcut that wrote it"
+        )
+
+    def of(simplices: Sequence[Simplex]) -> Sequence[Cost]:
+        rows = np.array(simplices, dtype=np.int64).reshape(len(simplices), configuration.dimension + 1)
+        costs = MEASURES[name](configuration, rows, argument)
+        return costs.tolist() if isinstance(costs, np.ndarray) else costs
+
+    return of

@@ -1,0 +1,171 @@
+"""Clique cuts: of simplices that cross each other pairwise, a triangulation contains at most one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.separation.seam import Cut, FractionalPoint, Separator
+
+# Weights in the search are integers, so that its result does not depend on the order of summation.
+_UNIT = 1 << 30
+# A clique counts as violated from this much above 1 on.
+_MARGIN = _UNIT // 10_000
+
+
+class CliqueCuts(Separator):
+    """Cuts ``sum of x over a clique of the crossing graph <= 1`` (the paper, Sec. 2.5).
+
+    All simplices over one generic point form a clique, and Formulation 2 fixes their sum to 1: such cliques are never
+    violated there. What is found is a clique without a common point.
+
+    For each fractional simplex that is in no clique yet, the heaviest clique through it is sought by branch and bound
+    with a weighted colouring as bound; a search that takes too long ends with the best clique so far. Every clique
+    is then extended by simplices that cross all its members, whatever their value.
+
+    Parameters
+    ----------
+    max_cuts : int
+        At most this many cuts per point, most violated first.
+    effort : int
+        Search nodes per point, about; each simplex gets its share.
+    lift : int
+        At most this many simplices of value zero are added to each clique.
+    """
+
+    name: ClassVar[str] = "clique"
+
+    def __init__(self, *, max_cuts: int = 100, effort: int = 10_000, lift: int = 30) -> None:
+        if max_cuts < 1 or effort < 1 or lift < 0:
+            raise ValueError("max_cuts and effort are at least 1, lift at least 0")
+        self.max_cuts, self.effort, self.lift = max_cuts, effort, lift
+
+    def separate(self, point: FractionalPoint) -> Iterator[Cut]:
+        """Yield violated cliques, most violated first."""
+        columns = point.fractional
+        values = point.x[columns]
+        cliques = heavy_cliques(point.crossings, values, self.effort)
+        cliques.sort(key=lambda clique: (-values[clique].sum(), clique))
+        for clique in cliques[: self.max_cuts]:
+            members = self.extended(columns[clique])
+            yield Cut(members, 1, proof={"clique": members.tolist()})
+
+    def extended(self, clique: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Add simplices that cross all members and each other, the largest first, since they cross most."""
+        members = [int(column) for column in clique]
+        if self.lift:
+            candidates = self.problem.crossing_rows(clique).all(axis=0)
+            while len(members) < len(clique) + self.lift:
+                open_columns = np.flatnonzero(candidates)
+                if not len(open_columns):
+                    break
+                chosen = int(open_columns[np.argmax(self.problem.volumes[open_columns])])
+                members.append(chosen)
+                candidates &= self.problem.crossing_rows(np.array([chosen]))[0]
+        return np.array(sorted(members), dtype=np.int64)
+
+
+def heavy_cliques(
+    crossings: NDArray[np.bool_], values: NDArray[np.floating], effort: int
+) -> list[list[int]]:
+    """Find cliques of weight above 1 that cover as many nodes as possible.
+
+    Parameters
+    ----------
+    crossings : ndarray of bool, shape (k, k)
+        A graph: symmetric, without loops.
+    values : ndarray of float, shape (k,)
+        Weights of the nodes, at least 0.
+    effort : int
+        Search nodes, about.
+
+    Returns
+    -------
+    list of list of int
+        Each ascending and maximal, none twice.
+    """
+    order = np.lexsort((np.arange(len(values)), -values))
+    crossings, values = crossings[np.ix_(order, order)], values[order]
+    search = _Search(crossings, values)
+    cliques: dict[tuple[int, ...], None] = {}
+    covered = 0
+    # Nodes with little around them first: those that are in no heavy clique are done with, and leave the graph.
+    for node in np.argsort(crossings @ values, kind="stable").tolist():
+        if covered >> node & 1:
+            continue
+        clique = search.heaviest_through(node, effort // len(values) + 10)
+        if clique:
+            covered |= clique
+            cliques.setdefault(tuple(sorted(order[list(_bits(clique))].tolist())))
+        elif search.effort > 0:
+            search.remaining &= ~(1 << node)
+    return [list(clique) for clique in cliques]
+
+
+class _Search:
+    """Branch and bound for heaviest cliques; sets of nodes are bit masks."""
+
+    def __init__(self, crossings: NDArray[np.bool_], values: NDArray[np.floating]) -> None:
+        packed = np.packbits(crossings, axis=1, bitorder="little")
+        self.adjacent = [int.from_bytes(row.tobytes(), "little") for row in packed]
+        self.weight = np.rint(values * _UNIT).astype(np.int64).tolist()
+        self.remaining = (1 << len(values)) - 1
+        self.effort = 0
+        self.best = self.best_weight = 0
+
+    def heaviest_through(self, node: int, effort: int) -> int:
+        """Return the heaviest clique through a node as a mask, 0 if none is found that weighs more than 1."""
+        self.effort = effort
+        self.best, self.best_weight = 0, _UNIT + _MARGIN
+        self._grow(1 << node, self.weight[node], self.adjacent[node] & self.remaining)
+        return self.best
+
+    def _grow(self, clique: int, weight: int, candidates: int) -> None:
+        self.effort -= 1
+        if not candidates:
+            if weight > self.best_weight:
+                self.best, self.best_weight = clique, weight
+            return
+        for node, bound in self._coloured(candidates, self.best_weight - weight):
+            if weight + bound <= self.best_weight or self.effort <= 0:
+                return
+            self._grow(clique | 1 << node, weight + self.weight[node], candidates & self.adjacent[node])
+            candidates &= ~(1 << node)
+
+    def _coloured(self, candidates: int, slack: int) -> list[tuple[int, int]]:
+        """List nodes with a bound on the weight of a clique in the nodes listed after them and themselves.
+
+        Nodes are covered by stable sets with multiplicities; a clique has at most one node of each. Nodes within the
+        first `slack` of the cover cannot lead to anything better and are left out.
+        """
+        residual = {node: self.weight[node] for node in _bits(candidates)}
+        listed: list[tuple[int, int]] = []
+        if sum(residual.values()) <= slack:
+            return listed
+        total = 0
+        while candidates:
+            stable, open_nodes, share = [], candidates, _UNIT
+            while open_nodes:
+                node = (open_nodes & -open_nodes).bit_length() - 1
+                stable.append(node)
+                share = min(share, residual[node])
+                open_nodes &= ~self.adjacent[node] & ~(1 << node)
+            total += share
+            for node in stable:
+                residual[node] -= share
+                if not residual[node]:
+                    candidates &= ~(1 << node)
+                    if total > slack:
+                        listed.append((node, total))
+        listed.reverse()
+        return listed
+
+
+def _bits(mask: int) -> Iterable[int]:
+    while mask:
+        low = mask & -mask
+        yield low.bit_length() - 1
+        mask ^= low

@@ -1,0 +1,351 @@
+"""Files of points and the one entry for all instances."""
+
+from __future__ import annotations
+
+import json
+import os
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bcut import instances
+from bcut.errors import InputError
+from bcut.families import build
+from bcut.files import FORMATS, SUFFIXES, format_points, read_points, write_points
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.numbers import AlgebraicNumber, parse_number
+from bcut.instance import load_instance
+
+PLY_HEADER = (
+    "ply\nformat {encoding} 1.0\nelement vertex 4\n"
+    "property {kind} x\nproperty {kind} y\nproperty {kind} z\nend_header\n"
+)
+CLOUD = np.array([[0.1, 0.2, 0.7], [1, 0, 0], [0, 1.0 / 3, 0], [0, 0, 1e-5]])
+
+
+def written(tmp_path: Path, name: str, content: str | bytes) -> Path:
+    path = tmp_path / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["cube:3", "moae", "random:9,3,seed=4", "dodecahedron", "prism:7", "antiprism:4", "pentagon-center"],
+)
+@pytest.mark.parametrize("kind", FORMATS)
+def test_written_points_are_read_back_exactly(tmp_path: Path, text: str, kind: str) -> None:
+    configuration = load_instance(text)
+    path = tmp_path / f"points.{kind}"
+    if kind == "dat" and configuration.field.degree > 1:
+        with pytest.raises(InputError, match="rational coordinates only"):
+            write_points(configuration, path)
+        assert list(tmp_path.iterdir()) == []
+        return
+    write_points(configuration, path)
+    again = read_points(path)
+    assert again.digest == configuration.digest
+    assert again.field == configuration.field
+    assert again.name == (text if kind == "json" else "points")
+    assert path.read_text() == format_points(configuration, kind)
+    assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.fractions(), st.fractions()), min_size=3, max_size=8, unique=True), st.data())
+def test_rational_points_survive_every_format(
+    tmp_path_factory: pytest.TempPathFactory, points: list[tuple[Fraction, Fraction]], data: st.DataObject
+) -> None:
+    points = [*points, (points[0][0] + 1000, points[0][1]), (points[0][0], points[0][1] + 1000)]
+    configuration = PointConfiguration.from_values(list(dict.fromkeys(points)))
+    kind = data.draw(st.sampled_from(FORMATS))
+    path = tmp_path_factory.mktemp("points") / f"p.{kind}"
+    write_points(configuration, path)
+    assert read_points(path) == configuration
+
+
+def test_an_existing_file_survives_a_failed_write(tmp_path: Path) -> None:
+    path = written(tmp_path, "keep.dat", "old")
+    with pytest.raises(InputError):
+        write_points(build("dodecahedron"), path)
+    assert path.read_text() == "old"
+    write_points(build("moae"), path)
+    assert read_points(path) == build("moae")
+
+
+@pytest.mark.parametrize(
+    ("target", "fragment"),
+    [
+        ("", "folder"),
+        ("missing/points.json", "no folder"),
+        ("points.txt", "cannot be written as"),
+        ("x", "json"),
+    ],
+)
+def test_unwritable_targets_are_refused(tmp_path: Path, target: str, fragment: str) -> None:
+    with pytest.raises(InputError, match=fragment):
+        write_points(build("moae"), tmp_path / target, kind="json" if not target else None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_native_files_hold_a_name_and_notes(tmp_path: Path) -> None:
+    document = {
+        "schema": 1,
+        "name": "mine",
+        "points": [[0, 0], [1, 0.5], ["1/3", "sqrt(2)"]],
+        "source": "a book",
+    }
+    configuration = load_instance(written(tmp_path, "a.json", json.dumps(document)))
+    assert configuration.name == "mine"
+    assert configuration.exact_points() == (("0", "0"), ("1", "1/2"), ("1/3", "sqrt(2)"))
+    bare = load_instance(written(tmp_path, "b.json", "\ufeff" + json.dumps(document["points"])))
+    assert bare == configuration
+    assert bare.name == "b"
+
+
+def test_json_decimals_are_the_nearest_doubles(tmp_path: Path) -> None:
+    configuration = read_points(written(tmp_path, "a.json", '[[0.1, 0], ["0.1", 1], [1e-3, 0.3]]'))
+    assert configuration.scalars()[0][0] == configuration.scalars()[1][0] == Fraction(0.1)
+    assert configuration.scalars()[2] == (Fraction(1e-3), Fraction(0.3))
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("[[1,0,0],[1,1,0],[1,0,1]]", [[0, 0], [1, 0], [0, 1]]),
+        ("[[0,0,1],[1/2,0,1],[0,-3,1]]\n[[1,0,2]]\n", [[0, 0], ["1/2", 0], [0, -3]]),
+        ("# comment\n[ [0 0 1]\n  [1 0 1]\n  [0 1 1] ]\n[]", [[0, 0], [1, 0], [0, 1]]),
+        # No column of ones: the functionals are the half sum and (1/2, 1, 1/2).
+        (
+            "[[1,1,0,0],[1,0,1,0],[1,0,0,1],[0,1,1,0],[0,1,0,1],[0,0,1,1]]",
+            [[1, 1, 0], [1, 0, 1], [1, 0, 0], [0, 1, 1], [0, 1, 0], [0, 0, 1]],
+        ),
+        ("[[2,0,0],[0,1,0],[0,0,2]]", [[2, 0], [0, 1], [0, 0]]),
+        # Homogeneous points in a hyperplane of their space keep their affine rank.
+        ("[[2,0,0,0],[0,2,0,0],[0,0,1,1]]", [[2, 0], [0, 2], [0, 0]]),
+    ],
+)
+def test_topcom_files(tmp_path: Path, text: str, points: list[list[object]]) -> None:
+    configuration = read_points(written(tmp_path, "a.dat", text))
+    assert configuration == PointConfiguration.from_values(points)
+
+
+def test_the_barycentric_mother_of_all_examples_is_moae_up_to_an_affine_map(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.dat", "[[4,0,0],[0,4,0],[0,0,4],[2,1,1],[1,2,1],[1,1,2]]")
+    assert read_points(path) == build("moae")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,0\n1/2,sqrt(3)\n1,0.5\n",
+        "x, y\n0, 0\n1/2, sqrt(3)\n\n# a comment\n1, 0.5",
+        "0;0\r\n1/2;sqrt(3)\r\n1;0.5\r\n",
+        "first coordinate\tsecond\n0\t0\n1/2\tsqrt(3)\n1\t0.5\n",
+        "  0   0\n1/2 sqrt(3)\n1 .5",
+        '"0","0"\n"1/2","sqrt(3)"\n"1","5e-1"\n',
+        "\ufeff0,0\n1/2,sqrt( 9 / 3 )\n1,1-1/2\n",
+    ],
+)
+def test_tables_in_all_their_dialects(tmp_path: Path, text: str) -> None:
+    configuration = read_points(written(tmp_path, "t.csv", text))
+    assert configuration.exact_points() == (("0", "0"), ("1/2", "sqrt(3)"), ("1", "1/2"))
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int16, np.uint64, ">f8"])
+def test_numpy_files(tmp_path: Path, kind: type) -> None:
+    points = (np.random.default_rng(0).random((10, 3)) * 100).astype(kind)
+    path = tmp_path / "a.npy"
+    np.save(path, points)
+    configuration = read_points(path)
+    assert configuration.name == "a"
+    np.testing.assert_array_equal(configuration.floats, points.astype(float))
+
+
+def test_off_files_keep_all_vertices_in_order(tmp_path: Path) -> None:
+    rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in CLOUD.tolist())
+    for name, text in {
+        "cloud.off": f"OFF\n4 0 0\n{rows}",
+        "mesh.OFF": f"# made by hand\nOFF\n4 1 0\n\n{rows}3 0 1 2\n",
+    }.items():
+        np.testing.assert_array_equal(read_points(written(tmp_path, name, text)).floats, CLOUD)
+
+
+def test_ply_files_keep_all_vertices_in_order(tmp_path: Path) -> None:
+    rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in CLOUD.tolist())
+    text = PLY_HEADER.format(encoding="ascii", kind="double")
+    np.testing.assert_array_equal(read_points(written(tmp_path, "a.ply", text + rows)).floats, CLOUD)
+    faces = text.replace("end_header", "element face 1\nproperty list uchar int vertex_indices\nend_header")
+    np.testing.assert_array_equal(
+        read_points(written(tmp_path, "f.ply", f"{faces}{rows}3 0 1 2\n")).floats, CLOUD
+    )
+    for kind, code in (("double", "<f8"), ("float", "<f4")):
+        header = PLY_HEADER.format(encoding="binary_little_endian", kind=kind).encode()
+        path = written(tmp_path, f"{kind}.ply", header + CLOUD.astype(code).tobytes())
+        np.testing.assert_array_equal(read_points(path).floats, CLOUD.astype(code).astype(float))
+
+
+BAD_FILES: list[tuple[str, str | bytes, str]] = [
+    ("empty.json", "", "empty"),
+    ("blank.csv", " \n\n", "empty"),
+    ("broken.json", '{"points": [[0, 0],\n [1, }', "line 2, column 6: not JSON"),
+    ("number.json", "5", "holds int"),
+    ("other.json", '{"schema": 1}', '"points" is missing'),
+    ("future.json", '{"schema": 2, "points": []}', "schema 2 is unknown"),
+    ("name.json", '{"name": 5, "points": [[0,0],[1,0],[0,1]]}', '"name" must be a text'),
+    ("nan.json", "[[0, 0], [1, NaN], [0, 1]]", "coordinate 1 of point 1 .* nan"),
+    ("infinite.json", "[[0, 0], [1, 1e999], [0, 1]]", "coordinate 1 of point 1 .* inf"),
+    ("null.json", "[[0, 0], [1, null], [0, 1]]", "None, not an integer"),
+    ("ragged.json", "[[0, 0], [1], [0, 1]]", "point 1 has 1 coordinates"),
+    ("deep.json", "[" * 100_000, "nested too deeply"),
+    ("digits.json", f"[[{'9' * 5000}, 1]]", "too long a number"),
+    ("latin.json", "[[0, 0], [1, 0], [0, 1]] é".encode("latin-1"), "not UTF-8"),
+    ("garbage.dat", bytes(range(128, 256)), "not UTF-8"),
+    ("zeros.csv", b"1,2\0\n3,4\n", "binary data"),
+    ("flat.json", "[[0, 0], [1, 1], [2, 2]]", "hyperplane"),
+    ("twice.json", "[[0, 0], [1, 0], [0, 1], [1, 0]]", "points 1 and 3 .* equal"),
+    ("open.dat", "[[1,0,0],\n[1,1", "line 2: the list of points does not end"),
+    ("none.dat", "# nothing\n", "no list of points"),
+    ("words.dat", "hello", "'hello' stands outside"),
+    ("decimal.dat", "[[1,0,0],\n[1,0.5,2]]", "line 2: point 1, coordinate 1 .*'0.5'"),
+    ("zero.dat", "[[1/0,1,1]]", "divides by zero"),
+    ("vectors.dat", "[[1,0,0],[2,0,0],[0,1,0],[0,0,1]]", "no homogeneous coordinates"),
+    ("ragged.dat", "[[1,0,0],[1,1]]", r"point 1 .* has 2 coordinates, point 0 has 3"),
+    ("deep.dat", "[[[1]]]", "too many opening brackets"),
+    ("empty.dat", "[]", "no points"),
+    ("header.csv", "x,y\n", "no points"),
+    ("word.csv", "1,2\n3,abc\n5,9\n", "line 2, column 2: .*'abc'"),
+    ("ragged.csv", "1,2\n3,4,5\n", "line 2 has 3 entries but line 1 has 2"),
+    ("gap.csv", "1,2\n3,\n5,9\n", "line 2, column 2: .* empty"),
+    ("comma.csv", "0,5;1,5\n2;3\n4;4\n", "line 1, column 1: .*','"),
+    ("nan.csv", "nan,1\n2,3\n4,9\n", "line 1, column 1: .* finite"),
+    ("quote.csv", '1,"2\n3,4\n5,9\n', "line 1"),
+    ("text.npy", "hello", "not an .npy file"),
+    ("cut.npy", b"\x93NUMPY\x01\x00v\x00{'descr'", "no readable .npy"),
+    ("hello.off", "hello", "the first line is 'hello'"),
+    ("four.off", "4OFF\n1 0 0\n1 2 3 4\n", "dimension 3"),
+    ("cut.off", "OFF\n4 0 0\n0 0 0\n1 0 0\n", "no readable OFF"),
+    ("word.off", "OFF\n3 0 0\n0 0 0\n1 0 x\n0 1 1\n", "no readable OFF"),
+    ("hello.ply", "hello", "no readable PLY"),
+    ("cut.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n", "header promises 4"),
+    ("word.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n0 x 1\n1 1 1\n", "PLY"),
+    ("tail.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n0 1 1\n1 1 2x\n", "PLY"),
+    ("short.ply", PLY_HEADER.format(encoding="binary_little_endian", kind="float").encode() + b"1234", "PLY"),
+    ("points.xyz", "0 0\n1 0\n0 1\n", "unknown suffix '.xyz'"),
+    ("points", "0 0\n1 0\n0 1\n", "unknown suffix ''"),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "fragment"), BAD_FILES, ids=[name for name, _, _ in BAD_FILES])
+def test_bad_files_are_refused_with_file_place_and_reason(
+    tmp_path: Path, name: str, content: str | bytes, fragment: str
+) -> None:
+    path = written(tmp_path, name, content)
+    with pytest.raises(InputError, match=fragment) as caught:
+        load_instance(str(path))
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert len(message) < len(str(path)) + 400
+    with pytest.raises(InputError, match=fragment):
+        read_points(path)
+
+
+def test_bad_arrays_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    for array, fragment in (
+        (np.array([[{}]], dtype=object), "allow_pickle"),
+        (np.zeros((3, 2), dtype=complex), "complex"),
+        (np.zeros(3), "shape"),
+        (np.zeros((0, 2)), "no points"),
+    ):
+        np.save(path, array)
+        with pytest.raises(InputError, match=fragment):
+            read_points(path)
+    np.savez(tmp_path / "b.npz", points=np.zeros((3, 2)))
+    os.replace(tmp_path / "b.npz", path)
+    with pytest.raises(InputError, match="archive"):
+        read_points(path)
+
+
+def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
+    folder = tmp_path / "folder.json"
+    folder.mkdir()
+    for path, fragment in (
+        (tmp_path / "no.json", "no such file"),
+        (folder, "directory"),
+        (tmp_path, "directory"),
+    ):
+        with pytest.raises(InputError, match=fragment):
+            load_instance(path)
+        with pytest.raises(InputError, match=fragment):
+            load_instance(str(path))
+    with pytest.raises(InputError, match="no valid path"):
+        load_instance("a\0b.json")
+
+
+def test_names_are_found_before_files_without_a_suffix(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "moae").mkdir()
+    (tmp_path / "cube:3").write_text("no points")
+    assert load_instance("moae") == build("moae")
+    assert load_instance(" cube:3 ").n == 8
+    written(tmp_path, "own.csv", "0,0\n1,0\n0,1\n")
+    assert load_instance("own.csv").name == load_instance(Path("own.csv")).name == "own"
+    for suffix in SUFFIXES:
+        with pytest.raises(InputError, match="no such file"):
+            load_instance(f"cube:3{suffix}")
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("", "there is no instance ''; an instance is a file"),
+        ("icosahedrn", "did you mean icosahedron"),
+        ("cub:3", "did you mean cube"),
+        ("pentagon-centre", "did you mean pentagon-center"),
+        ("known-optima", "there is no instance"),
+        ("no/such/file", "no such file"),
+    ],
+)
+def test_unknown_instances_are_refused_with_suggestions(text: str, fragment: str) -> None:
+    with pytest.raises(InputError, match=fragment):
+        load_instance(text)
+
+
+def test_every_bundled_instance_loads_under_its_name() -> None:
+    assert "pentagon-center" in instances.names()
+    for name in instances.names():
+        assert load_instance(name).name == name
+        assert load_instance(instances.path(name)).name == name
+    with pytest.raises(KeyError, match="pentagon-center"):
+        instances.path("nothing")
+
+
+def test_the_pentagon_is_regular_and_its_costs_cover_it_once() -> None:
+    configuration = load_instance("pentagon-center")
+    points = configuration.scalars()
+    assert points[0] == (0, 0)
+    for k in range(1, 6):
+        x, y = points[k]
+        following = points[k % 5 + 1]
+        assert x * x + y * y == 1
+        assert x * following[0] + y * following[1] == parse_number("cos(2*pi/5)")
+        assert x * following[1] - y * following[0] > 0
+
+    def doubled_area(triangle: list[int]) -> AlgebraicNumber:
+        (ax, ay), (bx, by), (cx, cy) = (points[i] for i in triangle)
+        return abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+
+    document = json.loads(instances.path("pentagon-center-costs").read_text(encoding="utf-8"))
+    assert document["default"] == 1
+    triangles = [triangle for triangle, cost in document["costs"] if cost == 0]
+    assert len(triangles) == len(document["costs"]) == 10
+    # Section 2.5: the ten triangles at 1/2 are a point of Formulation 2, so they cover the pentagon once.
+    pentagon = sum(doubled_area([0, k, k % 5 + 1]) for k in range(1, 6))
+    assert sum(doubled_area(triangle) for triangle in triangles) / 2 == pentagon
