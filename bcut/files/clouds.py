@@ -42,7 +42,7 @@ def read(path: Path) -> tuple[np.ndarray[Any, Any], str | None]:
     options = {"fix_texture": False, "skip_materials": True} if kind == "ply" else {}
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # NumPy only warns about entries that are no numbers
+            warnings.simplefilter("error")  # older NumPy only warns about entries that are no numbers
             loaded = trimesh.load(io.BytesIO(content), file_type=kind, process=False, **options)
             vertices = np.array(loaded.vertices, dtype=np.float64)
     except Exception as error:  # the readers fail in whatever way the damage makes them

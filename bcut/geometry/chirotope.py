@@ -20,6 +20,8 @@ from bcut.geometry.subsets import all_subsets, ranks, without
 
 # Tables are arrays with an entry per (d+1)-subset; beyond this they no longer fit a workstation's memory.
 MAX_SUBSETS = 60_000_000
+# A determinant has 2**d minors.
+MAX_DIMENSION = 16
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,14 @@ class Chirotope:
         Raises
         ------
         TooLargeError
-            If there are more than `MAX_SUBSETS` subsets.
+            If there are more than `MAX_SUBSETS` subsets, or the dimension is above `MAX_DIMENSION`.
         """
         n, d = configuration.n, configuration.dimension
+        if d > MAX_DIMENSION:
+            raise TooLargeError(
+                f"{configuration.name}: dimension {d}; determinants are computed up to dimension {MAX_DIMENSION}. "
+                "Take points of a smaller dimension."
+            )
         if comb(n, d + 1) > MAX_SUBSETS:
             raise TooLargeError(
                 f"{configuration.name}: {n} points in dimension {d} have {comb(n, d + 1):,} subsets of {d + 1} points; "

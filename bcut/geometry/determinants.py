@@ -9,7 +9,7 @@ Three tiers, each exact on what it decides:
 
 from __future__ import annotations
 
-from math import factorial, prod
+from math import comb, factorial, prod
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,8 @@ from bcut.geometry.configuration import PointConfiguration
 
 Signs = NDArray[np.int8]
 
-# Tuples handled at once: large enough to amortise numpy's overhead, small enough for the cache and for memory.
-_CHUNK = 1 << 16
+# Numbers in the widest layer of minors: large enough to amortise numpy's overhead, small enough for the cache.
+_CHUNK = 1 << 18
 _UNIT_ROUNDOFF = 2.0**-53
 
 
@@ -40,9 +40,11 @@ def orientation_signs(configuration: PointConfiguration, tuples: NDArray[np.inte
         Sign of ``det(p_1 - p_0, ..., p_d - p_0)``: -1, 0 or 1, decided exactly.
     """
     kernel = _Kernel(configuration)
+    d = configuration.dimension
+    step = max(1, _CHUNK // (comb(d, d // 2) * configuration.field.degree))
     signs = np.empty(len(tuples), dtype=np.int8)
-    for start in range(0, len(tuples), _CHUNK):
-        signs[start : start + _CHUNK] = kernel.signs(tuples[start : start + _CHUNK])
+    for start in range(0, len(tuples), step):
+        signs[start : start + step] = kernel.signs(tuples[start : start + step])
     return signs
 
 

@@ -103,7 +103,7 @@ def check_triangulation(
     unused = tuple(vertex for vertex in range(exact.n) if vertex not in used)
     if spanning and unused:
         raise VerificationError(
-            f"not spanning: {_count(len(unused), 'point')} of {exact.n} in no simplex, {_named(unused)}, "
+            f"not spanning: {len(unused)} of {exact.n} points are in no simplex, {_named(unused)}, "
             "but the problem asks for triangulations that use every point"
         )
     return TriangulationReport(
@@ -253,7 +253,3 @@ def _first(defects: list[str]) -> str:
 def _named(points: Sequence[int]) -> str:
     text = ", ".join(map(str, points[:10]))
     return f"{text}, ..." if len(points) > 10 else text
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun} is" if number == 1 else f"{number} {noun}s are"

@@ -1,0 +1,385 @@
+"""Certificates: the bound of exact multipliers is re-computed, and what is not proven is not believed."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bcut.bounds.root import root_bound
+from bcut.errors import ResultError, VerificationError
+from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.crossings import crossing_matrix
+from bcut.geometry.triangulations import triangulations
+from bcut.instance import load_instance
+from bcut.objectives.objective import make_objective
+from bcut.solving.certificates import make_certificate
+from bcut.verification.certificate import CertificateData, certified_bound
+from bcut.verification.costs import Costs
+from bcut.verification.cuts import CertificateCut, check_clique, cross
+from bcut.verification.exact_points import ExactPoints, SideTable
+from bcut.verification.verify import verify
+
+# 2---3
+# |   |
+# 0---1
+SQUARE = [[0, 0], [1, 0], [0, 1], [1, 1]]
+
+# By hand: with y = 2 on the coverage row, 1 on the diagonal 0-3 and -1 on 1-2 all reduced costs are zero.
+# The generic point of the flag lies in 012 and 013. On the line 0-3, 1 is on the - side; on 1-2, 0 is on the + side.
+CERTIFICATE = {
+    "bound": "2",
+    "flag": [0, 1, 2],
+    "multipliers": [["coverage", "2"], [[0, 3], "1"], [[1, 2], "-1"]],
+    "cuts": [],
+    "reason": None,
+}
+
+
+def square_result(**changes: Any) -> dict[str, Any]:
+    """The optimal result for the square with its certificate; changes go to the certificate."""
+    configuration = PointConfiguration.from_values(SQUARE)
+    return {
+        "schema": 1,
+        "instance": {
+            "name": "square",
+            "dimension": 2,
+            "points": [list(point) for point in configuration.exact_points()],
+            "digest": configuration.digest,
+        },
+        "problem": {"objective": "cardinality", "sense": "min", "spanning": False},
+        "status": "optimal",
+        "value": 2,
+        "bound": 2,
+        "gap": 0,
+        "triangulation": [[0, 1, 2], [1, 2, 3]],
+        "certificate": {**copy.deepcopy(CERTIFICATE), **changes},
+    }
+
+
+def test_certificate_written_by_hand_proves_optimality() -> None:
+    verification = verify(square_result())
+    assert verification.statement == (
+        "optimal, proven exactly: the triangulation is verified, and its value 2 meets the bound 2"
+    )
+    assert verification.exact_bound == verification.rounded_bound == 2
+    assert verification.proven_optimal
+
+
+def test_limit_result_is_still_proven_optimal_by_its_certificate() -> None:
+    assert verify({**square_result(), "status": "limit"}).proven_optimal
+
+
+def test_infeasible_side_of_the_sense_is_seen() -> None:
+    # The same multipliers with the other sign bound the maximum from above.
+    turned = [["coverage", "-2"], [[0, 3], "-1"], [[1, 2], "1"]]
+    data = square_result(multipliers=turned)
+    data["problem"]["sense"] = "max"
+    assert verify(data).exact_bound == 2
+    data["certificate"]["bound"] = "1"
+    with pytest.raises(VerificationError, match="claims the bound 1, but its multipliers prove 2 only"):
+        verify(data)
+
+
+@pytest.mark.parametrize(
+    ("row", "multiplier", "proven"),
+    [(0, "1", 1), (0, "3", 1), (1, "0", 1), (1, "3/2", "3/2"), (2, "1", 0), (2, "-1/3", "4/3")],
+)
+def test_changed_multiplier_proves_less(row: int, multiplier: str, proven: int | str) -> None:
+    data = square_result()
+    data["certificate"]["multipliers"][row][1] = multiplier
+    with pytest.raises(
+        VerificationError, match=f"claims the bound 2, but its multipliers prove {proven} only"
+    ):
+        verify(data)
+    data["certificate"]["bound"] = str(proven)
+    verification = verify(data)
+    assert verification.exact_bound == Fraction(proven)
+    # Integral costs: whatever is above 1 proves 2.
+    assert verification.proven_optimal == (Fraction(proven) > 1)
+
+
+def test_weaker_claim_than_proven_is_improved() -> None:
+    verification = verify(square_result(bound="-7"))
+    assert (verification.exact_bound, verification.proven_optimal) == (2, True)
+
+
+def test_loose_bound_leaves_optimality_to_the_solver() -> None:
+    statement = verify(square_result(bound="1", multipliers=[["coverage", "1"]])).statement
+    assert statement == (
+        "triangulation verified, value 2; bound 1 proven exactly; optimality rests on the solver's tree"
+    )
+
+
+def test_bound_without_triangulation() -> None:
+    data = {
+        **square_result(),
+        "status": "bound",
+        "triangulation": None,
+        "value": None,
+        "gap": None,
+        "bound": 3,
+    }
+    assert verify(data).statement == (
+        "there is no triangulation in this result (status 'bound'); bound 2 proven exactly; "
+        "the bound 3 rests on the solver's tree"
+    )
+
+
+def test_large_configurations_are_left_out_and_the_statement_says_so() -> None:
+    verification = verify(square_result(), max_subsets=3)
+    assert verification.exact_bound is None
+    assert not verification.proven_optimal
+    assert "not re-checked: there are 4 subsets of 3 points" in verification.statement
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"flag": [0, 1]}, r"flag \[0, 1\] is not a list of 3 different points"),
+        ({"flag": [0, 1, 1]}, "is not a list of 3 different points"),
+        ({"flag": [0, 1, 4]}, "is not a list of 3 different points"),
+        ({"multipliers": [[[0, 1], "1"]]}, r"\[0, 1\], which has no points strictly on both sides"),
+        ({"multipliers": [[[0, 1, 2], "1"]]}, r"row \[0, 1, 2\] does not name 2 points"),
+        ({"multipliers": [[[], "1"]]}, r"row \[\] does not name 2 points"),
+        ({"multipliers": [[[3, 7], "1"]]}, r"row \[3, 7\] does not name 2 points"),
+    ],
+)
+def test_rows_that_do_not_exist(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(VerificationError, match=reason):
+        verify(square_result(**changes))
+
+
+def test_flag_in_a_hyperplane_is_refused() -> None:
+    points = ExactPoints([[0, 0], [1, 0], [2, 0], [0, 1]])
+    certificate = CertificateData(Fraction(0), flag=(0, 1, 2))
+    with pytest.raises(VerificationError, match="lies in a hyperplane"):
+        certified_bound(points, certificate, ones(), sense="min", spanning=False)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"bound": 2}, "'certificate.bound': this is a rational as text"),
+        ({"bound": "2 "}, "'certificate.bound': this is a rational as text"),
+        ({"bound": "2/0"}, "'certificate.bound': this is a rational as text"),
+        ({"flag": None}, "'certificate.flag': this is a list of vertices"),
+        ({"multipliers": [["coverage"]]}, r"'certificate.multipliers\[0\]': this is a pair"),
+        ({"multipliers": [["volume", "1"]]}, "this is a list of vertices"),
+        ({"multipliers": [[[3, 0], "1"]]}, "vertices are ascending here"),
+        ({"multipliers": [[[0, 3], 0.5]]}, "this is a rational as text"),
+        ({"multipliers": [[[0, 3], "1"], [[0, 3], "1"]]}, "each row has one multiplier"),
+        ({"multipliers": [["coverage", "0"], ["coverage", "1"]]}, "each row has one multiplier"),
+        ({"cuts": {}}, "'certificate.cuts': this is a list of cuts"),
+        ({"cuts": [{"family": "clique"}]}, r"has no entry 'certificate.cuts\[0\].simplices'"),
+    ],
+)
+def test_malformed_certificates(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(ResultError, match=reason):
+        verify(square_result(**changes))
+
+
+# Against the program that makes certificates, which shares nothing with the one that checks them.
+
+
+def ones() -> Costs:
+    return Costs(lambda simplices: [1] * len(simplices), integral=True)
+
+
+@pytest.mark.parametrize("sense", ["min", "max"])
+@pytest.mark.parametrize(
+    ("name", "objective", "spanning"),
+    [
+        ("cube:3", "cardinality", False),
+        ("cube:4", "cardinality", False),
+        ("polygon:5,center", "cardinality", False),
+        ("polygon:7", "random-costs:5", False),
+        ("grid:3,3", "cardinality", True),
+        ("grid:3,3", "random-costs:1", False),
+        ("moae", "random-costs:2", False),
+        ("icosahedron", "cardinality", False),
+        ("prism:5", "random-costs:4", False),
+        ("random:14,3,seed=1000", "cardinality", True),
+    ],
+)
+def test_certificates_prove_exactly_what_they_claim(
+    name: str, objective: str, spanning: bool, sense: str
+) -> None:
+    configuration = load_instance(name)
+    formulation = cocircuit_formulation(configuration, spanning=spanning)
+    goal = make_objective(objective, formulation, sense=sense)
+    root = root_bound(formulation, goal)
+    assert root.first is not None
+    certificate = make_certificate(formulation, goal, root.first)
+    best = next(triangulations(formulation.chirotope, spanning=spanning))
+    simplices = formulation.simplices[list(best)].tolist()
+    value = goal.value(best)
+    data = {
+        "schema": 1,
+        "instance": {
+            "name": name,
+            "dimension": configuration.dimension,
+            "points": [list(point) for point in configuration.exact_points()],
+            "digest": configuration.digest,
+        },
+        "problem": {"objective": objective, "sense": sense, "spanning": spanning},
+        "status": "limit",
+        "value": str(value),
+        "bound": None,
+        "gap": None,
+        "triangulation": simplices,
+        "certificate": {
+            "bound": certificate.bound,
+            "flag": certificate.flag,
+            "multipliers": certificate.multipliers,
+        },
+    }
+    verification = verify(data)
+    assert certificate.bound is not None
+    claimed = Fraction(certificate.bound)
+    if goal.fits_64_bits:
+        # Costs were not rounded, so the same sum is computed in two ways.
+        assert verification.exact_bound == claimed
+    assert verification.exact_bound is not None
+    assert abs(verification.exact_bound - claimed) < Fraction(1, 10**6)
+    assert verification.value == value
+
+
+RATIONALS = st.fractions(min_value=-4, max_value=4, max_denominator=6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from(["polygon:5,center", "grid:3,2", "grid:3,2 spanning", "cube:3", "prism:3"]),
+    st.sampled_from(["min", "max"]),
+    st.data(),
+)
+def test_any_multipliers_give_a_bound_on_every_triangulation(
+    name: str, sense: str, data: st.DataObject
+) -> None:
+    family, _, spanning = name.partition(" ")
+    configuration = load_instance(family)
+    formulation = cocircuit_formulation(configuration, spanning=bool(spanning))
+    facets = [facet for facet in formulation.row_faces if facet is not None]
+    costs = {tuple(simplex): data.draw(RATIONALS) for simplex in formulation.simplices.tolist()}
+    flag = data.draw(st.permutations(data.draw(st.sampled_from(formulation.chirotope.bases.tolist()))))
+    certificate = CertificateData(
+        None,
+        flag=tuple(flag),
+        coverage=data.draw(RATIONALS),
+        cocircuits={facet: data.draw(RATIONALS) for facet in data.draw(st.sets(st.sampled_from(facets)))},
+    )
+    found = certified_bound(
+        ExactPoints(configuration.scalars()),
+        certificate,
+        Costs(lambda simplices: [costs[simplex] for simplex in simplices], integral=False),
+        sense=sense,
+        spanning=bool(spanning),
+    )
+    assert found.candidates == len(formulation.simplices)
+    assert found.bound is not None
+    simplices = [tuple(simplex) for simplex in formulation.simplices.tolist()]
+    values = [
+        sum(costs[simplices[column]] for column in chosen)
+        for chosen in triangulations(formulation.chirotope, spanning=bool(spanning))
+    ]
+    assert found.bound <= min(values) if sense == "min" else found.bound >= max(values)
+
+
+# Cuts.
+
+
+def clique(simplices: Sequence[Sequence[int]], **changes: Any) -> dict[str, Any]:
+    cut = {
+        "family": "clique",
+        "simplices": simplices,
+        "coefficients": [1] * len(simplices),
+        "rhs": 1,
+        "multiplier": "-1",
+        "proof": {},
+    }
+    return {**cut, **changes}
+
+
+def two_overlapping(**certificate: Any) -> dict[str, Any]:
+    """Maximise the number of triangles among 012 and 013, which overlap: at most 1, but 2 without a cut."""
+    data = square_result(multipliers=[], **certificate)
+    costs = {"default": 0, "costs": [[[0, 1, 2], 1], [[0, 1, 3], 1]]}
+    data["problem"] = {"objective": "costs:x", "sense": "max", "spanning": False, "costs": costs}
+    return {**data, "value": 1, "bound": 1}
+
+
+def test_clique_cut_strengthens_the_bound() -> None:
+    assert verify(two_overlapping(bound="2")).exact_bound == 2
+    verification = verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]])]))
+    assert (verification.exact_bound, verification.proven_optimal) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("cut", "reason"),
+    [
+        (clique([[0, 1, 2], [1, 2, 3]]), r"\[0, 1, 2\] and \[1, 2, 3\] meet in a common face"),
+        (
+            clique([[0, 1, 2], [0, 1, 3]], coefficients=[1, 2]),
+            "one simplex alone can exceed its right-hand side 1",
+        ),
+        (clique([[0, 1, 2], [0, 1, 3]], rhs=-1), "one simplex alone can exceed"),
+        (clique([[0, 1, 2], [0, 1, 3]], multiplier="1"), "multiplier 1 of a '<=' row must not be positive"),
+        (clique([[0, 1, 2], [0, 1, 4]]), r"\[0, 1, 4\] does not name 3 points"),
+        (clique([[0, 1, 2], [0, 1]]), r"\[0, 1\] does not name 3 points"),
+    ],
+)
+def test_invalid_cuts_are_refused(cut: dict[str, Any], reason: str) -> None:
+    with pytest.raises(VerificationError, match=r"cut 0 of the certificate \(clique\).*" + reason):
+        verify(two_overlapping(bound="1", cuts=[cut]))
+
+
+def test_flat_simplex_in_a_clique_is_refused() -> None:
+    sides = SideTable(ExactPoints([[0, 0], [1, 0], [2, 0], [0, 1]]))
+    cut = CertificateCut("clique", ((0, 1, 2), (0, 1, 3)), (Fraction(1),) * 2, Fraction(1), Fraction(-1), {})
+    with pytest.raises(VerificationError, match=r"\[0, 1, 2\] is flat"):
+        check_clique(sides, cut)
+
+
+def test_cuts_of_unknown_families_are_not_believed() -> None:
+    cut = clique([[0, 1, 2], [1, 2, 3]], family="magic")
+    verification = verify(two_overlapping(bound="1", cuts=[cut]))
+    assert verification.exact_bound is None
+    assert not verification.proven_optimal
+    assert "was not re-checked: it uses cuts that cannot be re-checked (magic)" in verification.statement
+
+
+def test_cuts_without_multiplier_do_not_matter() -> None:
+    cut = clique([[0, 1, 2], [1, 2, 3]], family="magic", multiplier="0")
+    assert verify(two_overlapping(bound="2", cuts=[cut])).exact_bound == 2
+
+
+@pytest.mark.parametrize(
+    "changes", [{"coefficients": [1]}, {"simplices": [], "coefficients": []}, {"simplices": [[0, 1, 2]] * 2}]
+)
+def test_malformed_cuts(changes: dict[str, Any]) -> None:
+    with pytest.raises(ResultError, match="different simplices, and a coefficient for each"):
+        verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]], **changes)]))
+
+
+@pytest.mark.parametrize("name", ["grid:3,2", "polygon:6", "cube:3", "prism:5", "cross-polytope:4"])
+def test_crossings_agree_with_the_geometry_of_the_model(name: str) -> None:
+    configuration = load_instance(name)
+    chirotope = Chirotope.of(configuration)
+    generator = np.random.default_rng(1)
+    chosen = generator.permutation(len(chirotope.bases))[:40]
+    expected = crossing_matrix(chirotope, chirotope.bases[chosen])
+    sides = SideTable(ExactPoints(configuration.scalars()))
+    simplices = [tuple(simplex) for simplex in chirotope.bases[chosen].tolist()]
+    for i, j in combinations(range(len(simplices)), 2):
+        assert cross(sides, simplices[i], simplices[j]) == expected[i, j]
+    assert not any(cross(sides, simplex, simplex) for simplex in simplices)
