@@ -30,6 +30,8 @@ class CliqueCuts(Separator):
     ----------
     max_cuts : int
         At most this many cuts per point, most violated first.
+    max_nodes : int
+        Only that many fractional simplices, those of largest value, are looked at.
     effort : int
         Search nodes per point, about; each simplex gets its share.
     lift : int
@@ -38,16 +40,16 @@ class CliqueCuts(Separator):
 
     name: ClassVar[str] = "clique"
 
-    def __init__(self, *, max_cuts: int = 100, effort: int = 10_000, lift: int = 30) -> None:
-        if max_cuts < 1 or effort < 1 or lift < 0:
-            raise ValueError("max_cuts and effort are at least 1, lift at least 0")
-        self.max_cuts, self.effort, self.lift = max_cuts, effort, lift
+    def __init__(self, *, max_cuts: int = 100, max_nodes: int = 500, effort: int = 10_000, lift: int = 30) -> None:
+        if min(max_cuts, max_nodes, effort) < 1 or lift < 0:
+            raise ValueError("max_cuts, max_nodes and effort are at least 1, lift at least 0")
+        self.max_cuts, self.max_nodes, self.effort, self.lift = max_cuts, max_nodes, effort, lift
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
         """Yield violated cliques, most violated first."""
-        columns = point.fractional
+        columns = point.heaviest(self.max_nodes)
         values = point.x[columns]
-        cliques = heavy_cliques(point.crossings, values, self.effort)
+        cliques = heavy_cliques(point.crossings_among(columns), values, self.effort)
         cliques.sort(key=lambda clique: (-values[clique].sum(), clique))
         for clique in cliques[: self.max_cuts]:
             members = self.extended(columns[clique])

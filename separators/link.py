@@ -47,6 +47,8 @@ from bcut.separation.small_lp import SmallLps
 
 # A packing that falls short of y_e by less than this is perfect up to the accuracy of the relaxation's point.
 _SHORTFALL = 1e-6
+# Wedges with less than this are not part of the circulation but noise of the solver.
+_NOISE = 1e-9
 _LARGEST_DENOMINATOR = 24
 
 
@@ -98,7 +100,7 @@ class Link(Separator):
 
     def _cut(self, star: Star, values: NDArray[np.floating], weights: NDArray[np.floating]) -> Cut | None:
         """Make the exact cut: round, lift, and write alpha * y_e - w x <= 0 with few nonzero coefficients."""
-        support = np.flatnonzero(values > 0)
+        support = np.flatnonzero(values > _NOISE)
         integers = _to_integers(weights[support])
         alpha, lifted = lift_weights(star, support, integers, lift=self.lift)
         if alpha <= 0:
@@ -133,7 +135,7 @@ def most_violated_weights(
         Not negative; zero outside the support.
     """
     weights = np.zeros(len(values))
-    support = np.flatnonzero(values > 0)
+    support = np.flatnonzero(values > _NOISE)
     tails, heads, x = star.tails[support], star.heads[support], values[support]
     through = np.bincount(tails, weights=x, minlength=star.size)
     level = _direction_with_fewest_tails(star, support)

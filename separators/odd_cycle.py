@@ -33,26 +33,31 @@ class OddCycleCuts(Separator):
         At most this many cuts per point, most violated first.
     backend : {"scipy", "networkx"}
         What finds the shortest paths; the cycles' lengths are the same.
+    max_nodes : int
+        Only that many fractional simplices, those of largest value, are looked at. Where no crossing pair is violated, a
+        cycle through v is violated by x_v at most, because edges cover the rest of it: little is lost.
     lift : int
         At most this many simplices are lifted into each cycle.
     """
 
     name: ClassVar[str] = "odd-cycle"
 
-    def __init__(self, *, max_cuts: int = 100, backend: str = "scipy", lift: int = 30) -> None:
-        if max_cuts < 1 or lift < 0:
-            raise ValueError("max_cuts is at least 1, lift at least 0")
+    def __init__(
+        self, *, max_cuts: int = 100, backend: str = "scipy", max_nodes: int = 500, lift: int = 30
+    ) -> None:
+        if min(max_cuts, max_nodes) < 1 or lift < 0:
+            raise ValueError("max_cuts and max_nodes are at least 1, lift at least 0")
         if backend not in _BACKENDS:
             raise ValueError(f"backend is scipy or networkx, not '{backend}'")
-        self.max_cuts, self.backend, self.lift = max_cuts, backend, lift
+        self.max_cuts, self.backend, self.max_nodes, self.lift = max_cuts, backend, max_nodes, lift
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
         """Yield violated odd cycles, at most one per fractional simplex, most violated first."""
-        columns = point.fractional
-        values = point.x[columns]
+        columns = point.heaviest(self.max_nodes)
+        values, crossings = point.x[columns], point.crossings_among(columns)
         cycles: dict[tuple[int, ...], float] = {}
-        for walk in odd_closed_walks(point.crossings, values, self.backend):
-            cycle = chordless_cycle(walk, point.crossings)
+        for walk in odd_closed_walks(crossings, values, self.backend):
+            cycle = chordless_cycle(walk, crossings)
             violation = float(values[cycle].sum()) - (len(cycle) - 1) / 2
             if violation > _MARGIN / 2:
                 cycles.setdefault(_turned(cycle), violation)

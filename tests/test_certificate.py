@@ -35,7 +35,7 @@ from bcut.verification.verify import verify
 SQUARE = [[0, 0], [1, 0], [0, 1], [1, 1]]
 
 # By hand: with y = 2 on the coverage row, 1 on the diagonal 0-3 and -1 on 1-2 all reduced costs are zero.
-# The generic point of the flag lies in 012 and 013. On the line 0-3, 1 is on the - side; on 1-2, 0 is on the + side.
+# The generic point of the flag lies in 012 and 013. Point 1 is on the - side of 0-3, and 0 on the + side of 1-2.
 CERTIFICATE = {
     "bound": "2",
     "flag": [0, 1, 2],
@@ -298,7 +298,7 @@ def test_any_multipliers_give_a_bound_on_every_triangulation(
 # Cuts.
 
 
-def clique(simplices: Sequence[Sequence[int]], **changes: Any) -> dict[str, Any]:
+def clique(simplices: Sequence[Sequence[int]], /, **changes: Any) -> dict[str, Any]:
     cut = {
         "family": "clique",
         "simplices": simplices,

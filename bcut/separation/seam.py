@@ -162,6 +162,17 @@ class FractionalPoint:
         """The crossing graph on `fractional`, as a symmetric matrix without loops."""
         return self.problem.crossings(self.fractional)
 
+    def heaviest(self, count: int) -> NDArray[np.intp]:
+        """Return the `count` fractional columns of largest value (all, if there are no more), ascending."""
+        order = np.argsort(-self.x[self.fractional], kind="stable")
+        return np.sort(self.fractional[order[:count]])
+
+    def crossings_among(self, columns: NDArray[np.integer]) -> NDArray[np.bool_]:
+        """Return the crossing graph on some columns, taken from `crossings` where it has them all."""
+        if len(columns) == len(self.fractional) and np.array_equal(columns, self.fractional):
+            return self.crossings
+        return self.problem.crossings(columns)
+
     def value(self, cut: Cut) -> float:
         """Return the left-hand side of a cut at this point."""
         values = self.x[np.asarray(cut.simplices, dtype=np.intp)]
