@@ -50,10 +50,11 @@ class RoundRecord:
 
 @dataclass
 class Root:
-    """The root bound: LP values, unrounded, before and after cuts."""
+    """The root bound: LP values, unrounded, before and after cuts, and whether the last LP point was integral."""
 
     lp: float | None = None
     lp_after_cuts: float | None = None
+    integral: bool | None = None
     rounds: list[RoundRecord] = field(default_factory=list)
 
 

@@ -15,6 +15,9 @@ _UNIT = 1 << 30
 # A clique counts as violated from this much above 1 on.
 _MARGIN = _UNIT // 10_000
 
+# Candidates for lifting that are tried, per simplex that is added.
+_POOL = 4
+
 
 class CliqueCuts(Separator):
     """Cuts ``sum of x over a clique of the crossing graph <= 1`` (the paper, Sec. 2.5).
@@ -40,7 +43,7 @@ class CliqueCuts(Separator):
 
     name: ClassVar[str] = "clique"
 
-    def __init__(self, *, max_cuts: int = 100, max_nodes: int = 500, effort: int = 10_000, lift: int = 30) -> None:
+    def __init__(self, *, max_cuts: int = 100, max_nodes: int = 500, effort: int = 10_000, lift: int = 150) -> None:
         if min(max_cuts, max_nodes, effort) < 1 or lift < 0:
             raise ValueError("max_cuts, max_nodes and effort are at least 1, lift at least 0")
         self.max_cuts, self.max_nodes, self.effort, self.lift = max_cuts, max_nodes, effort, lift
@@ -52,21 +55,23 @@ class CliqueCuts(Separator):
         cliques = heavy_cliques(point.crossings_among(columns), values, self.effort)
         cliques.sort(key=lambda clique: (-values[clique].sum(), clique))
         for clique in cliques[: self.max_cuts]:
-            members = self.extended(columns[clique])
+            members = self.extended(columns[clique], point)
             yield Cut(members, 1, proof={"clique": members.tolist()})
 
-    def extended(self, clique: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Add simplices that cross all members and each other, the largest first, since they cross most."""
+    def extended(self, clique: NDArray[np.integer], point: FractionalPoint) -> NDArray[np.int64]:
+        """Add simplices that cross all members and each other, as many as are found in one pass."""
         members = [int(column) for column in clique]
         if self.lift:
-            candidates = self.problem.crossing_rows(clique).all(axis=0)
-            while len(members) < len(clique) + self.lift:
-                open_columns = np.flatnonzero(candidates)
-                if not len(open_columns):
-                    break
-                chosen = int(open_columns[np.argmax(self.problem.volumes[open_columns])])
-                members.append(chosen)
-                candidates &= self.problem.crossing_rows(np.array([chosen]))[0]
+            candidates = np.flatnonzero(self.problem.crossing_rows(clique).all(axis=0))
+            candidates = self.problem.nearest_first(candidates, clique)
+            candidates = candidates[np.argsort(-point.x[candidates], kind="stable")][: _POOL * self.lift]
+            crossings = self.problem.crossings(candidates)
+            allowed = np.ones(len(candidates), dtype=bool)
+            for position, candidate in enumerate(candidates.tolist()):
+                if allowed[position]:
+                    members.append(candidate)
+                    allowed &= crossings[position]
+            del members[len(clique) + self.lift :]
         return np.array(sorted(members), dtype=np.int64)
 
 

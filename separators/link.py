@@ -79,7 +79,7 @@ class Link(Separator):
     def separate(self, point: FractionalPoint) -> Iterable[Cut]:
         """Yield the most violated link cut of each face, by how much its packing falls short."""
         found = []
-        for number in self._faces_to_try(point.x):
+        for number in self.faces_to_try(point.x):
             star = self.stars.star(number)
             values = point.x[star.columns]
             shortfall, weights = most_violated_weights(star, values, self.programs)
@@ -91,7 +91,7 @@ class Link(Separator):
         for _, cut in found[: self.max_cuts or None]:
             yield cut
 
-    def _faces_to_try(self, x: NDArray[np.floating]) -> list[int]:
+    def faces_to_try(self, x: NDArray[np.floating]) -> list[int]:
         """List the faces whose star carries a fractional value."""
         values = x[self.stars.columns]
         fractional = (values > _SHORTFALL) & (values < 1 - _SHORTFALL)

@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 
 from bcut.separation.seam import Cut, FractionalPoint, Separator
 
-# A cycle counts as violated when its length is below 1 by this much.
+# Cuts count as violated from this much on.
 _MARGIN = 1e-4
+
+# Cycles up to this length are looked at: those not shorter than 1 may be violated once they are lifted.
+_REACH = 1.1
+
+# Candidates for lifting that are tried, per simplex that is lifted.
+_POOL = 4
 
 
 class OddCycleCuts(Separator):
@@ -43,7 +49,7 @@ class OddCycleCuts(Separator):
     name: ClassVar[str] = "odd-cycle"
 
     def __init__(
-        self, *, max_cuts: int = 100, backend: str = "scipy", max_nodes: int = 500, lift: int = 30
+        self, *, max_cuts: int = 100, backend: str = "scipy", max_nodes: int = 500, lift: int = 150
     ) -> None:
         if min(max_cuts, max_nodes) < 1 or lift < 0:
             raise ValueError("max_cuts and max_nodes are at least 1, lift at least 0")
@@ -59,7 +65,9 @@ class OddCycleCuts(Separator):
         for walk in odd_closed_walks(crossings, values, self.backend):
             cycle = chordless_cycle(walk, crossings)
             violation = float(values[cycle].sum()) - (len(cycle) - 1) / 2
-            if violation > _MARGIN / 2:
+            if violation <= _MARGIN and self.lift:
+                violation = _lifted_violation(cycle, crossings, values)
+            if violation > _MARGIN:
                 cycles.setdefault(_turned(cycle), violation)
         ranked = sorted(cycles, key=lambda cycle: (-cycles[cycle], cycle))
         for cycle in ranked[: self.max_cuts]:
@@ -76,21 +84,41 @@ class OddCycleCuts(Separator):
         """Return simplices to add to a chordless cycle, and their coefficients, all positive."""
         if not self.lift:
             return np.empty(0, dtype=np.int64), []
-        crossing = self.problem.crossing_rows(cycle)
-        gains = hole_gains(crossing)
+        gains = hole_gains(self.problem.crossing_rows(cycle))
         gains[cycle] = 0
-        candidates = np.flatnonzero(gains)
-        values, volumes = point.x[candidates], self.problem.volumes[candidates]
-        first = np.lexsort((-volumes, -gains[candidates], -gains[candidates] * values))
-        candidates = candidates[first[: 2 * self.lift]]
+        candidates = self.problem.nearest_first(np.flatnonzero(gains), cycle)
+        candidates = _most_useful(candidates, gains, point.x)[: _POOL * self.lift]
         nodes = np.concatenate((cycle, candidates))
-        return _sequential_lifting(nodes, len(cycle), self.problem.crossings(nodes), self.lift)
+        coefficients = sequential_lifting(len(cycle), self.problem.crossings(nodes), self.lift)
+        chosen = np.flatnonzero(coefficients)
+        return candidates[chosen], coefficients[chosen].tolist()
+
+
+def _most_useful(
+    candidates: NDArray[np.integer], gains: NDArray[np.integer], values: NDArray[np.floating]
+) -> NDArray[np.integer]:
+    """Sort candidates by what they may add to the cut at the point, then by their possible coefficients."""
+    gains, added = gains[candidates], gains[candidates] * values[candidates]
+    return candidates[np.lexsort((np.arange(len(candidates)), -gains, -added))]
+
+
+def _lifted_violation(
+    cycle: list[int], crossings: NDArray[np.bool_], values: NDArray[np.floating]
+) -> float:
+    """Return by how much the cycle's cut is violated when simplices of positive value are lifted into it."""
+    gains = hole_gains(crossings[cycle])
+    gains[cycle] = 0
+    candidates = _most_useful(np.flatnonzero(gains), gains, values)
+    nodes = np.concatenate((cycle, candidates)).astype(np.intp)
+    coefficients = sequential_lifting(len(cycle), crossings[np.ix_(nodes, nodes)], len(candidates))
+    left_side = values[cycle].sum() + coefficients @ values[candidates]
+    return float(left_side) - (len(cycle) - 1) / 2
 
 
 def odd_closed_walks(
     crossings: NDArray[np.bool_], values: NDArray[np.floating], backend: str = "scipy"
 ) -> Iterator[list[int]]:
-    """Find, through each node of a graph, a shortest odd closed walk, if it is shorter than 1.
+    """Find, through each node of a graph, a shortest odd closed walk, if it is no longer than 1, about.
 
     Parameters
     ----------
@@ -107,7 +135,7 @@ def odd_closed_walks(
     """
     rows, columns = np.nonzero(crossings)
     lengths = np.maximum(0.0, 1.0 - values[rows] - values[columns])
-    short = lengths < 1.0 - _MARGIN
+    short = lengths < _REACH
     yield from _BACKENDS[backend](len(values), rows[short], columns[short], lengths[short])
 
 
@@ -122,7 +150,7 @@ def _walks_by_scipy(
     batch = 64  # distances and predecessors of a batch are dense
     for start in range(0, count, batch):
         sources = np.arange(start, min(start + batch, count))
-        distances, before = dijkstra(cover, indices=sources, return_predecessors=True, limit=1.0 - _MARGIN)
+        distances, before = dijkstra(cover, indices=sources, return_predecessors=True, limit=_REACH)
         for source, reached, previous in zip(sources.tolist(), distances, before, strict=True):
             if np.isfinite(reached[source + count]):
                 walk = [source + count]
@@ -141,7 +169,7 @@ def _walks_by_networkx(
         cover.add_edge(u, v + count, weight=length)
     for source in range(count):
         if source in cover and source + count in cover:
-            paths = nx.single_source_dijkstra(cover, source, cutoff=1.0 - _MARGIN)[1]
+            paths = nx.single_source_dijkstra(cover, source, cutoff=_REACH)[1]
             if source + count in paths:
                 yield [node % count for node in paths[source + count][:-1]]
 
@@ -216,30 +244,40 @@ def hole_gains(crossing: NDArray[np.bool_]) -> NDArray[np.int64]:
     return (size - 1) // 2 - most
 
 
-def _sequential_lifting(
-    nodes: NDArray[np.integer], size: int, crossings: NDArray[np.bool_], most: int
-) -> tuple[NDArray[np.int64], list[int]]:
-    """Lift nodes[size:] in their order into the cycle nodes[:size], until `most` have a positive coefficient."""
+def sequential_lifting(size: int, crossings: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
+    """Lift nodes, one after another, into the inequality of an odd cycle.
+
+    Parameters
+    ----------
+    size : int
+        Length k of the cycle, which the first k nodes of the graph are.
+    crossings : ndarray of bool, shape (k + c, k + c)
+        The graph, with c candidates in the order in which they are tried.
+    most : int
+        Stop when that many have a positive coefficient.
+
+    Returns
+    -------
+    ndarray of int, shape (c,)
+        Coefficients of the candidates, zero where one is left out.
+    """
     packed = np.packbits(crossings, axis=1, bitorder="little")
     adjacent = [int.from_bytes(row.tobytes(), "little") for row in packed]
     weights = dict.fromkeys(range(size), 1)
     rhs = (size - 1) // 2
-    chosen = 0
     inside = (1 << size) - 1
-    for node in range(size, len(nodes)):
-        coefficient = rhs - heaviest_stable(inside & ~adjacent[node], adjacent, weights)
+    for node in range(size, len(crossings)):
+        coefficient = rhs - heaviest_stable(inside & ~adjacent[node], adjacent, weights, rhs)
         if coefficient > 0:
             weights[node] = coefficient
             inside |= 1 << node
-            chosen += 1
-            if chosen == most:
+            if len(weights) == size + most:
                 break
-    lifted = [node for node in weights if node >= size]
-    return np.asarray(nodes)[lifted].astype(np.int64), [weights[node] for node in lifted]
+    return np.array([weights.get(node, 0) for node in range(size, len(crossings))], dtype=np.int64)
 
 
-def heaviest_stable(nodes: int, adjacent: Sequence[int], weights: dict[int, int]) -> int:
-    """Return the largest weight of a stable set among some nodes of a graph, exactly.
+def heaviest_stable(nodes: int, adjacent: Sequence[int], weights: dict[int, int], cap: int) -> int:
+    """Return the largest weight of a stable set among some nodes of a graph, exactly, or `cap` if it is at least that.
 
     Parameters
     ----------
@@ -249,17 +287,18 @@ def heaviest_stable(nodes: int, adjacent: Sequence[int], weights: dict[int, int]
         The neighbours of each node, as masks.
     weights : dict of int to int
         Positive weights.
+    cap : int
+        Positive; the search stops as soon as it is reached.
     """
-    known: dict[int, int] = {0: 0}
-
-    def solve(mask: int) -> int:
-        if mask in known:
-            return known[mask]
-        node = mask.bit_length() - 1
-        best = weights[node] + solve(mask & ~(1 << node) & ~adjacent[node])
-        if mask & adjacent[node]:
-            best = max(best, solve(mask & ~(1 << node)))
-        known[mask] = best
-        return best
-
-    return solve(nodes)
+    best = 0
+    while nodes:
+        lowest = nodes & -nodes
+        nodes ^= lowest
+        node = lowest.bit_length() - 1
+        weight, rest = weights[node], nodes & ~adjacent[node]
+        if rest and weight < cap:
+            weight += heaviest_stable(rest, adjacent, weights, cap - weight)
+        if weight >= cap:
+            return cap
+        best = max(best, weight)
+    return best

@@ -35,7 +35,7 @@ from bcut.verification.verify import verify
 SQUARE = [[0, 0], [1, 0], [0, 1], [1, 1]]
 
 # By hand: with y = 2 on the coverage row, 1 on the diagonal 0-3 and -1 on 1-2 all reduced costs are zero.
-# The generic point of the flag lies in 012 and 013. Point 1 is on the - side of 0-3, and 0 on the + side of 1-2.
+# The generic point of the flag lies in 012 and 013. Point 1 is on the - side of 03, 0 on the + side of 12.
 CERTIFICATE = {
     "bound": "2",
     "flag": [0, 1, 2],
@@ -106,6 +106,17 @@ def test_changed_multiplier_proves_less(row: int, multiplier: str, proven: int |
     assert verification.exact_bound == Fraction(proven)
     # Integral costs: whatever is above 1 proves 2.
     assert verification.proven_optimal == (Fraction(proven) > 1)
+
+
+def test_bounds_are_not_rounded_where_costs_are_no_integers() -> None:
+    halved = [["coverage", "1"], [[0, 3], "3/4"], [[1, 2], "-1/2"]]
+    data = {**square_result(bound="3/4", multipliers=halved), "value": 1, "bound": 1}
+    data["problem"] = {**data["problem"], "objective": "costs:x", "costs": {"default": "1/2", "costs": []}}
+    verification = verify(data)
+    assert (verification.exact_bound, verification.rounded_bound) == (Fraction(3, 4), Fraction(3, 4))
+    assert not verification.proven_optimal
+    with pytest.raises(VerificationError, match="'optimal', but its bound 3/4 leaves room"):
+        verify({**data, "bound": "3/4", "gap": 0.25})
 
 
 def test_weaker_claim_than_proven_is_improved() -> None:

@@ -60,7 +60,7 @@ def test_all_that_is_found_are_different_triangulations(instance: str, spanning:
         )
 
 
-def number_by_flips_of_subsets(points: list[list[int]], *, spanning: bool) -> int:
+def number_by_exhaustion(points: list[list[int]], *, spanning: bool) -> int:
     """Count the sets of simplices that are triangulations, by trying all sets of at most the possible sizes."""
     candidates = [s for s in full_simplices(points) if not spanning or is_empty(points, s)]
     count = 0
@@ -83,7 +83,7 @@ def test_exhaustion_over_all_sets_of_simplices_finds_no_more(values: list[list[i
     configuration = configuration_or_none(values)
     assume(configuration is not None)
     chirotope = Chirotope.of(configuration)
-    expected = number_by_flips_of_subsets(configuration.scalars(), spanning=spanning)
+    expected = number_by_exhaustion(configuration.scalars(), spanning=spanning)
     assert sum(count_by_size(chirotope, spanning=spanning).values()) == expected
 
 

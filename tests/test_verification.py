@@ -281,8 +281,8 @@ def determinant(rows: Sequence[Sequence[int]]) -> int:
 class Judge:
     """Knows by definition which sets of simplices are triangulations, for integer points.
 
-    Simplices are a triangulation when no two of them cross (as the model's geometry sees it, which is not used by
-    verification) and their volumes add up to the hull's (as Qhull measures it).
+    Simplices are a triangulation when no two of them cross (as the model's geometry sees it, which
+    verification does not use) and their volumes add up to the hull's (as Qhull measures it).
     """
 
     def __init__(self, points: Points) -> None:

@@ -119,6 +119,14 @@ def test_value_of_an_embedded_costs_table(value: str | float) -> None:
     assert verify(data).value == Fraction(57, 20)
 
 
+def test_bound_is_not_rounded_where_one_cost_is_no_integer() -> None:
+    costs = {"default": 1, "costs": [[[0, 1, 3], "1/2"]]}
+    changes = {"problem__objective": "costs:gone.json", "problem__costs": costs, "value": 3.5}
+    verify(result_of(GRID, GRID_4, bound=3.5, **changes))
+    with pytest.raises(VerificationError, match="'optimal', but its bound 31/10 leaves room"):
+        verify(result_of(GRID, GRID_4, bound="31/10", gap=0.4 / 3.5, **changes))
+
+
 def test_value_of_a_registered_measure() -> None:
     values = [Fraction(x) for x in np.random.default_rng(3).random(20).tolist()]
     colex = sorted(combinations(range(6), 3), key=lambda simplex: simplex[::-1])

@@ -17,8 +17,10 @@ from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut
 
 # From this many columns on, interior point with crossover beats the dual simplex by far on the first relaxation: these
-# programs are massively degenerate. Afterwards the dual simplex starts from the last basis.
+# programs are massively degenerate. Afterwards the dual simplex starts from the last basis; where it takes more than
+# this share of the number of rows in iterations, starting over with interior point is faster again.
 _INTERIOR_POINT_FROM = 1500
+_SIMPLEX_ITERATIONS = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +83,7 @@ class Relaxation:
         solver.setOptionValue("threads", 1)
         # Presolve finds nothing to remove here and makes the rest slower.
         solver.setOptionValue("presolve", "off")
-        if columns >= _INTERIOR_POINT_FROM:
-            solver.setOptionValue("solver", "ipm")
+        self._interior_point = columns >= _INTERIOR_POINT_FROM
         if solver.passModel(model) == highspy.HighsStatus.kError:
             raise SolverError("HiGHS refused the model of the relaxation")
         return solver
@@ -94,7 +95,9 @@ class Relaxation:
         smaller = Relaxation(
             self.formulation.restricted_to(columns), self.objective.restricted_to(columns), deadline=self.deadline
         )
-        smaller.add([cut.restricted_to(place) for cut in self.cuts])
+        # Cuts may coincide on what is left, or have nothing left.
+        cuts = {cut.key: cut for cut in (cut.restricted_to(place) for cut in self.cuts)}
+        smaller.add([cut for cut in cuts.values() if len(cut.columns) or cut.rhs < 0])
         return smaller
 
     def add(self, cuts: Sequence[IntegerCut]) -> None:
@@ -141,14 +144,16 @@ class Relaxation:
         import highspy
 
         solver = self._solver
-        if self.deadline is not None:
-            remaining = self.deadline - time.monotonic()
-            if remaining <= 0:
-                return None
-            solver.setOptionValue("time_limit", solver.getRunTime() + remaining)
-        solver.run()
-        solver.setOptionValue("solver", "simplex")
-        status = solver.getModelStatus()
+        if not self._interior_point and len(self._costs) >= _INTERIOR_POINT_FROM:
+            limit = int(_SIMPLEX_ITERATIONS * self.formulation.matrix.shape[0])
+            solver.setOptionValue("simplex_iteration_limit", limit)
+        status = self._run()
+        if status == highspy.HighsModelStatus.kIterationLimit:
+            solver.setOptionValue("simplex_iteration_limit", 2**31 - 1)
+            self._interior_point = True
+            status = self._run()
+        elif not self.cuts:
+            self._interior_point = False
         if status == highspy.HighsModelStatus.kTimeLimit:
             return None
         if status == highspy.HighsModelStatus.kInfeasible:
@@ -162,6 +167,20 @@ class Relaxation:
         slack = np.array([cut.rhs for cut in self.cuts]) - activity
         value = self.objective.sign * float(self._costs @ x)
         return RelaxationPoint(x, value, np.array(solution.row_dual), slack)
+
+    def _run(self) -> Any:
+        """Run HiGHS within the deadline; return the model status."""
+        import highspy
+
+        solver = self._solver
+        if self.deadline is not None:
+            remaining = self.deadline - time.monotonic()
+            if remaining <= 0:
+                return highspy.HighsModelStatus.kTimeLimit
+            solver.setOptionValue("time_limit", solver.getRunTime() + remaining)
+        solver.setOptionValue("solver", "ipm" if self._interior_point else "simplex")
+        solver.run()
+        return solver.getModelStatus()
 
     def safe_bound(self, duals: NDArray[np.float64]) -> SafeBound:
         """Turn multipliers of all rows and cuts into an exact bound."""

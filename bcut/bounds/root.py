@@ -204,6 +204,7 @@ class _Loop:
         self.slack_for = {}
         result.separation = result.separation.restricted_to(keep)
         result.columns = result.columns[keep]
+        result.point = None if result.point is None else result.point[keep]
         result.last = result.last.restricted_to(keep)
 
 

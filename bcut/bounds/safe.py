@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import floor, frexp
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from bcut.objectives.objective import Objective
 if TYPE_CHECKING:
     import scipy.sparse as sp
 
-# Multipliers are rounded to multiples of 2**-SHIFT where that keeps all sums within 64 bits.
+# Multipliers of ordinary size are rounded to multiples of 2**-SHIFT where that keeps all sums within 64 bits.
 SHIFT = 45
 
 # Stands for a side that a row does not have.
@@ -43,6 +44,7 @@ class SafeBound:
         Times ``2**-shift``, rounded towards minus infinity where costs had to be: x_j = 1 costs at least this much
         above `value` (or nothing, where negative).
     shift : int
+        Negative where costs or multipliers are huge.
     """
 
     value: Fraction
@@ -50,14 +52,20 @@ class SafeBound:
     reduced_costs: NDArray[np.int64]
     shift: int
 
+    @property
+    def unit(self) -> Fraction:
+        """What the integers count: ``2**-shift``."""
+        return _unit(self.shift)
+
     def restricted_to(self, columns: NDArray[np.integer]) -> SafeBound:
         """Return the same bound with the reduced costs of some columns only."""
         return replace(self, reduced_costs=self.reduced_costs[columns])
 
     def columns_within(self, target: Fraction) -> NDArray[np.intp]:
         """List the columns that a solution with ``sign * objective <= target`` may use (reduced-cost fixing)."""
-        slack = (target - self.value) * (1 << self.shift)
-        return np.flatnonzero(self.reduced_costs <= int(slack.__floor__()))
+        slack = floor((target - self.value) / self.unit)
+        # Reduced costs are below 2**62 in size.
+        return np.flatnonzero(self.reduced_costs <= max(-(2**62), min(slack, 2**62)))
 
 
 def safe_bound(
@@ -83,9 +91,10 @@ def safe_bound(
     -------
     SafeBound
     """
+    duals = np.where(np.isfinite(duals), duals, 0.0)
     shift = _shift(matrix, objective, duals)
     costs = _scaled_costs(objective, shift)
-    multipliers = np.rint(np.nan_to_num(duals) * 2.0**shift).astype(np.int64)
+    multipliers = np.rint(np.ldexp(duals, shift)).astype(np.int64)
     # A row without a lower side cannot be pushed up, one without an upper side cannot be pushed down.
     multipliers[(multipliers > 0) & (lower == -UNBOUNDED)] = 0
     multipliers[(multipliers < 0) & (upper == UNBOUNDED)] = 0
@@ -94,25 +103,34 @@ def safe_bound(
     active = multipliers != 0
     scaled = sum(int(y) * int(b) for y, b in zip(multipliers[active], sides[active], strict=True) if b)
     scaled += int(np.minimum(reduced, 0).sum())
-    return SafeBound(Fraction(scaled, 1 << shift), multipliers, reduced, shift)
+    return SafeBound(scaled * _unit(shift), multipliers, reduced, shift)
+
+
+def _unit(shift: int) -> Fraction:
+    return Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
 
 
 def _scaled_costs(objective: Objective, shift: int) -> NDArray[np.int64]:
     """Return ``floor(sign * cost * 2**shift)``, exactly."""
-    if objective.fits_64_bits and objective.denominator == 1:
+    if shift >= 0 and objective.fits_64_bits and objective.denominator == 1:
         return objective.sign * (objective.numerators.astype(np.int64) << shift)
-    scale = objective.sign << shift
-    return np.array([int(v) * scale // objective.denominator for v in objective.numerators], dtype=np.int64)
+    numerator, denominator = objective.sign << max(0, shift), objective.denominator << max(0, -shift)
+    return np.array([int(v) * numerator // denominator for v in objective.numerators], dtype=np.int64)
 
 
 def _shift(matrix: sp.csr_matrix, objective: Objective, duals: NDArray[np.floating]) -> int:
-    """Return the largest shift up to `SHIFT` for which every sum stays below 2**62."""
+    """Return the largest shift for which every sum stays below 2**62, but no more than numbers of this size need."""
     columns = max(1, matrix.shape[1])
-    entries = abs(matrix).sum(axis=0).max() if matrix.nnz else 0
-    size = float(np.abs(objective.costs).max(initial=1.0)) + float(np.abs(np.nan_to_num(duals)).max(initial=0.0)) * float(
-        entries
-    )
-    shift = SHIFT
-    while shift > 0 and size * columns * 2.0**shift >= 2.0**61:
-        shift -= 1
-    return shift
+    entries = int(abs(matrix).sum(axis=0).max()) if matrix.nnz else 0
+    largest_cost = float(np.abs(objective.costs).max(initial=0.0))
+    largest_dual = float(np.abs(duals).max(initial=0.0))
+    if largest_cost == largest_dual == 0.0:
+        return SHIFT
+    # Exponents of two, rounded up, so that nothing overflows on the way.
+    size = max(_exponent(largest_cost), _exponent(largest_dual) + entries.bit_length()) + 1
+    return min(SHIFT - min(0, size), 61 - columns.bit_length() - size)
+
+
+def _exponent(value: float) -> int:
+    """Return the least k with ``value < 2**k``."""
+    return frexp(value)[1] if value else -1074

@@ -66,6 +66,8 @@ class Formulation:
         """
         wanted = ranks(np.asarray(simplices), self.chirotope.n)
         known = self._simplex_ranks
+        if not len(known):
+            return np.full(wanted.shape, -1, dtype=np.int64)
         place = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
         return np.where(known[place] == wanted, place, -1)
 

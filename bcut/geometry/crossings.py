@@ -82,20 +82,18 @@ class CrossingTable:
         """
         d = self.chirotope.dimension
         left = FaceTable(simplices, self.chirotope.n)
-        crossing = np.zeros((left.count, self.table.count), dtype=bool)
+        # One bit for each given simplex, in one row for each fixed one: a face then passes on all its bits at once.
+        crossing = np.zeros((self.table.count, (left.count + 7) // 8), dtype=np.uint8)
         omitting = self._orientations(left, 0)
         for size in range(1, d + 2):
             keeping = self._orientations(left, size)
             faces = self._crossing_faces(left, size, omitting, keeping)
             if faces.any():
-                incidence = self.table.incidence[d + 2 - size]
-                for row, members in zip(crossing, left.incidence[size], strict=True):
-                    hit = faces[members].any(axis=0)
-                    if hit.any():
-                        for column in incidence.T:
-                            row |= hit[column]
+                hit = _packed_by_column(faces, left.incidence[size])
+                for column in self.table.incidence[d + 2 - size].T:
+                    crossing |= hit[column]
             omitting = keeping
-        return crossing
+        return np.ascontiguousarray(np.unpackbits(crossing, axis=1, count=left.count).T).view(np.bool_)
 
     def _crossing_faces(
         self, left: FaceTable, size: int, omitting: NDArray[np.int8], keeping: NDArray[np.int8]
@@ -147,6 +145,17 @@ class CrossingTable:
         for start in range(0, len(first), step):
             result[start : start + step] = _joined_orientations(chirotope, first[start : start + step], second)
         return result
+
+
+def _packed_by_column(faces: NDArray[np.bool_], incidence: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Join the rows of each simplex's faces and return, for each column, the simplices that have it, as packed bits."""
+    rows = np.packbits(faces, axis=1)
+    step = max(8, _CHUNK // max(1, faces.shape[1]) // 8 * 8)
+    parts = []
+    for start in range(0, len(incidence), step):
+        joined = np.bitwise_or.reduce(rows[incidence[start : start + step]], axis=1)
+        parts.append(np.packbits(np.unpackbits(joined, axis=1, count=faces.shape[1]), axis=0))
+    return np.ascontiguousarray(np.concatenate(parts).T)
 
 
 def _joined_orientations(

@@ -8,9 +8,10 @@ exactly.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from fractions import Fraction
-from math import comb, isfinite
+from math import comb
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,9 @@ Costs = NDArray[np.int64] | list[Fraction]
 Measure = Callable[[PointConfiguration, Simplices, str], Costs]
 
 MEASURES: dict[str, Measure] = {}
+
+# A text such as "1e999999999" has a billion digits when it is written out.
+_LONG_EXPONENT = re.compile(r"[eE][+-]?\d{4}")
 
 
 def measure(name: str) -> Callable[[Measure], Measure]:
@@ -96,6 +100,8 @@ def _read_json(path: Path) -> Any:
         raise InputError(f"costs file {path}: is not UTF-8 text") from None
     except json.JSONDecodeError as error:
         raise InputError(f"costs file {path}: line {error.lineno}, column {error.colno}: {error.msg}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"costs file {path}: cannot be read ({error})") from None
 
 
 def _entry(entry: Any, configuration: PointConfiguration, path: Path, number: int) -> tuple[tuple[int, ...], Fraction]:
@@ -113,12 +119,14 @@ def _entry(entry: Any, configuration: PointConfiguration, path: Path, number: in
 
 def _cost(value: Any, path: Path, where: str) -> Fraction:
     try:
-        if isinstance(value, int) and not isinstance(value, bool):
-            return Fraction(value)
-        if isinstance(value, float) and isfinite(value):
-            return Fraction(value)
-        if isinstance(value, str):
-            return Fraction(value)
-    except (ValueError, ZeroDivisionError):
+        if isinstance(value, str) and (len(value) > 1000 or _LONG_EXPONENT.search(value)):
+            raise OverflowError
+        if isinstance(value, int | float | str) and not isinstance(value, bool):
+            exact = Fraction(value)
+            float(exact)  # solvers work with doubles: a cost beyond their range is refused here
+            return exact
+    except (ValueError, ZeroDivisionError, OverflowError):
         pass
-    raise InputError(f'costs file {path}: {where}: a cost is a finite number or "p/q", not {json.dumps(value)}')
+    shown = json.dumps(value)
+    shown = shown if len(shown) <= 60 else shown[:57] + "..."
+    raise InputError(f'costs file {path}: {where}: a cost is a finite number or "p/q", not {shown}')

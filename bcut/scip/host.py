@@ -38,6 +38,9 @@ class TreeOptions:
         Only solutions strictly better than this value (in the sense of the objective) are wanted.
     scip_separators : bool
         Whether SCIP's own separators run.
+    unlimited : tuple of str
+        Separators of SCIP, such as "zerohalf", that run at the root without a limit on rounds or cuts, whether or not
+        the others run.
     presolve : bool
     heuristics : bool
     separate_every : int
@@ -51,6 +54,7 @@ class TreeOptions:
     seed: int = 0
     cutoff: float | None = None
     scip_separators: bool = True
+    unlimited: tuple[str, ...] = ()
     presolve: bool = True
     heuristics: bool = True
     separate_every: int = 1
@@ -155,6 +159,11 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
     model.setParam("propagating/probing/maxprerounds", 0)
     if not options.scip_separators:
         model.setSeparating(SCIP_PARAMSETTING.OFF)
+    for name in options.unlimited:
+        model.setParam(f"separating/{name}/freq", 0)
+        model.setParam(f"separating/{name}/maxroundsroot", -1)
+        model.setParam(f"separating/{name}/maxsepacutsroot", 2**30)
+        _unlimit_rounds(model)
     if not options.heuristics:
         model.setHeuristics(SCIP_PARAMSETTING.OFF)
 
@@ -169,10 +178,15 @@ def _include_adapter(
     model.includeSepa(adapter, "bcut", "separators of bcut", priority=1_000_000, freq=frequency, delay=False)
     # By default SCIP calls a separator at depths 0, 1, 4, 16, ... whatever its frequency says.
     model.setParam("separating/bcut/expbackoff", 1)
-    # Rounds are limited per family by the adapter; SCIP's own stalling limits would end them early.
+    # Rounds are limited by the adapter.
+    _unlimit_rounds(model)
+    return adapter
+
+
+def _unlimit_rounds(model: Model) -> None:
+    """Lift SCIP's overall limits on root rounds, which would end separation after a few that do not move the bound."""
     model.setParam("separating/maxstallroundsroot", -1)
     model.setParam("separating/maxroundsroot", -1)
-    return adapter
 
 
 def _add_start(model: Model, variables: list[Variable], start: NDArray[np.integer]) -> None:

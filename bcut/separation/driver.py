@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import gcd, lcm
+from math import floor, gcd, lcm
 from typing import Any
 
 import numpy as np
@@ -95,6 +95,8 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
     ------
     SeparatorError
         If the cut is malformed: unknown or repeated columns, inexact numbers, lengths that differ.
+    UnusableCutError
+        If the integers do not fit into 64 bits.
     """
     indices = np.asarray(cut.simplices)
     if indices.ndim != 1 or not len(indices) or not np.issubdtype(indices.dtype, np.integer):
@@ -113,13 +115,16 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
         raise SeparatorError(family, "a cut's coefficients are all zero")
     order = np.argsort(indices)
     keep = [int(i) for i in order if integers[i] != 0]
-    return IntegerCut(
-        family,
-        indices[keep].astype(np.int64),
-        np.array([integers[i] // divisor for i in keep], dtype=object).astype(np.int64),
-        int((rhs * scale / divisor).__floor__()),
-        cut.proof,
-    )
+    right = floor(rhs * scale / divisor)
+    coprime = [integers[i] // divisor for i in keep]
+    if max(abs(value) for value in (right, *coprime)) >= 2**62:
+        raise UnusableCutError
+    coefficients = np.array(coprime, dtype=np.int64)
+    return IntegerCut(family, indices[keep].astype(np.int64), coefficients, right, cut.proof)
+
+
+class UnusableCutError(Exception):
+    """A well-formed cut with numbers that no solver can use."""
 
 
 def _exact(value: Any, family: str) -> Fraction:
@@ -202,7 +207,11 @@ class Separation:
             statistics.calls += 1
             with _guard(separator, "separate", statistics):
                 for cut in separator.separate(point):
-                    scaled = to_integers(_checked(cut, separator.name), separator.name, len(x))
+                    try:
+                        scaled = to_integers(_checked(cut, separator.name), separator.name, len(x))
+                    except UnusableCutError:
+                        statistics.found += 1
+                        continue
                     if scaled.efficacy(x) > self.limits.min_efficacy:
                         statistics.found += 1
                         candidates.append(scaled)

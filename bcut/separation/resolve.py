@@ -218,6 +218,6 @@ def _guarded(source: str, action: Any) -> Any:
     """Run a plug-in's own code; what it raises becomes a `SeparatorError` with its traceback."""
     try:
         return action()
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a script that is no separator may well call sys.exit()
         text = "".join(traceback.format_exception(error))
         raise SeparatorError(source, f"loading it raised {type(error).__name__}: {error}", text) from error

@@ -203,7 +203,12 @@ class _Run:
             value=_number(search.value),
             bound=_number(proven),
             gap=_gap(search.value, proven),
-            root=Root(search.lp, search.lp_after_cuts, [_record(*item) for item in search.rounds]),
+            root=Root(
+                search.lp,
+                search.lp_after_cuts,
+                search.root_is_integral,
+                [_record(*item) for item in search.rounds],
+            ),
             size=Size(*self.formulation.size, search.columns_after_fixing),
             nodes=search.nodes,
             separators={name: vars(family).copy() for name, family in search.statistics.items()},

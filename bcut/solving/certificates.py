@@ -31,7 +31,7 @@ def make_certificate(formulation: Formulation, objective: Objective, bound: Safe
     for face, multiplier in zip(formulation.row_faces, bound.multipliers.tolist(), strict=True):
         if multiplier:
             row = "coverage" if face is None else list(face)
-            multipliers.append([row, str(Fraction(multiplier, 1 << bound.shift))])
+            multipliers.append([row, str(multiplier * bound.unit)])
     return Certificate(
         bound=str(objective.sign * bound.value),
         flag=formulation.chirotope.bases[0].tolist(),

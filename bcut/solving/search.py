@@ -79,6 +79,7 @@ class Search:
     exact: SafeBound | None = None
     lp: float | None = None
     lp_after_cuts: float | None = None
+    root_is_integral: bool | None = None
     rounds: list[tuple[str, Round]] = field(default_factory=list)
     columns_after_fixing: int | None = None
     nodes: int = 0
@@ -153,6 +154,7 @@ def bound_at_root(
     limits = RootLimits(deadline=search.deadline, target=target)
     with search.timed("root"):
         root = root_bound(part.formulation, part.objective, separation, limits=limits, on_round=on_round)
+    search.root_is_integral = root.status == "integral"
     if root.status == "integral" and root.point is not None:
         search.offer(part.columns[root.columns[root.point > 0.5]])
     return root

@@ -70,7 +70,7 @@ def check_clique(sides: SideTable, cut: CertificateCut) -> None:
                 f"clique cut: {list(first)} and {list(second)} meet in a common face, "
                 "so a triangulation may contain both"
             )
-    if False:
+    if max(Fraction(0), *cut.coefficients) > cut.rhs:
         raise VerificationError(
             f"clique cut: one simplex alone can exceed its right-hand side {cut.rhs}: "
             f"the largest coefficient is {max(cut.coefficients)}"

@@ -1,0 +1,121 @@
+"""`plot`: from a result to a picture file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.errors import InputError
+from bcut.files.atomic import check_writable, replacing
+from bcut.geometry.configuration import PointConfiguration
+from bcut.verification.reading import load_result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bcut.result import Result
+
+#: Suffixes of picture files, each a format.
+PICTURE_SUFFIXES = (".svg", ".png", ".pdf")
+
+_SIZE_INCHES = 6.0
+
+
+def plot(
+    result: Result | Mapping[str, Any] | str | os.PathLike[str],
+    picture: str | os.PathLike[str],
+    *,
+    explode: float = 0.35,
+    labels: bool = False,
+    normalize: bool = False,
+    title: str | None = None,
+) -> None:
+    """Draw the triangulation of a result.
+
+    Parameters
+    ----------
+    result : Result, mapping or path
+        A result, its data, or its file; of dimension 2 or 3.
+    picture : path
+        Ends in ".svg", ".png" or ".pdf".
+    explode : float
+        How far tetrahedra are moved apart, in units of their distance from the middle. With 0 they stay where they
+        are and are drawn see-through. Has no effect in 2D.
+    labels : bool
+        Number the points.
+    normalize : bool
+        Draw the affine image whose points spread alike in all directions: regular polygons and solids, whose exact
+        coordinates may be skewed, look regular again.
+    title : str, optional
+
+    Raises
+    ------
+    InputError
+        If there is no triangulation to draw, it has another dimension, the suffix is unknown, the file cannot be
+        written, or matplotlib is missing.
+    ResultError
+        If the result cannot be read.
+    """
+    target = Path(picture)
+    if target.suffix not in PICTURE_SUFFIXES:
+        known = ", ".join(PICTURE_SUFFIXES)
+        raise InputError(f"{target}: unknown suffix '{target.suffix}'; pictures are written as {known}")
+    check_writable(target)
+    points, simplices = _triangulation(result)
+    if normalize:
+        points = _round_image(points)
+    figure = _figure()
+    from bcut.plotting.drawing import draw_plane, draw_space
+
+    if points.shape[1] == 2:
+        draw_plane(figure, points, simplices, labels=labels)
+    else:
+        draw_space(figure, points, simplices, explode=explode, labels=labels)
+    if title:
+        figure.suptitle(title, fontsize=13)
+    with replacing(target) as temporary:
+        # Without a date the same result gives the same file.
+        metadata = {"Date": None} if target.suffix == ".svg" else None
+        figure.savefig(temporary, dpi=150, metadata=metadata, bbox_inches="tight", pad_inches=0.05)
+
+
+def _triangulation(
+    result: Result | Mapping[str, Any] | str | os.PathLike[str],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the points and simplices to draw."""
+    source = result if isinstance(result, Mapping | str | os.PathLike) else result.to_dict()
+    data, label = load_result(source)
+    if data.triangulation is None:
+        raise InputError(f"{label}: has no triangulation to draw (status '{data.status}'); solve the instance")
+    if data.dimension not in (2, 3):
+        raise InputError(f"{label}: is of dimension {data.dimension}; pictures are drawn in dimension 2 and 3")
+    points = PointConfiguration.from_values(data.points, name=data.name, origin=label).floats
+    size = data.dimension + 1
+    fits = points.shape[1] == data.dimension and all(
+        len(set(simplex)) == size and min(simplex) >= 0 and max(simplex) < len(points)
+        for simplex in data.triangulation
+    )
+    if not fits or not data.triangulation:
+        raise InputError(f"{label}: its triangulation does not fit its points; `bcut verify` says why")
+    return points, np.array(data.triangulation, dtype=np.int64)
+
+
+def _figure() -> Figure:
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise InputError("pictures need matplotlib; install it by pip install 'bcut[plot]'") from None
+    return Figure(figsize=(_SIZE_INCHES, _SIZE_INCHES))
+
+
+def _round_image(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the affine image with the identity as its covariance matrix."""
+    centred = points - points.mean(axis=0)
+    values, vectors = np.linalg.eigh(centred.T @ centred / len(points))
+    image: NDArray[np.float64] = centred @ (vectors / np.sqrt(values)) @ vectors.T
+    return image
