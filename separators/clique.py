@@ -43,7 +43,7 @@ class CliqueCuts(Separator):
 
     name: ClassVar[str] = "clique"
 
-    def __init__(self, *, max_cuts: int = 100, max_nodes: int = 500, effort: int = 10_000, lift: int = 150) -> None:
+    def __init__(self, *, max_cuts: int = 50, max_nodes: int = 500, effort: int = 4_000, lift: int = 150) -> None:
         if min(max_cuts, max_nodes, effort) < 1 or lift < 0:
             raise ValueError("max_cuts, max_nodes and effort are at least 1, lift at least 0")
         self.max_cuts, self.max_nodes, self.effort, self.lift = max_cuts, max_nodes, effort, lift

@@ -105,9 +105,9 @@ class Link(Separator):
         alpha, lifted = lift_weights(star, support, integers, lift=self.lift)
         if alpha <= 0:
             return None
-        coefficients = min(
-            (alpha * star.over(level) - lifted for level in range(int(star.levels[-1]) + 1)), key=np.count_nonzero
-        )
+        # Equivalent for every direction; the sparsest is the cheapest row.
+        choices = alpha * star.over - lifted
+        coefficients = choices[np.argmin(np.count_nonzero(choices, axis=1))]
         if coefficients @ values <= _SHORTFALL:
             return None
         kept = np.flatnonzero(coefficients)
@@ -138,30 +138,27 @@ def most_violated_weights(
     support = np.flatnonzero(values > _NOISE)
     tails, heads, x = star.tails[support], star.heads[support], values[support]
     through = np.bincount(tails, weights=x, minlength=star.size)
-    level = _direction_with_fewest_tails(star, support)
-    over = star.over(level)[support]
-    total = float(x[over].sum())
+    total = float(x[star.wraps[support]].sum())
     if through.max() >= total - _SHORTFALL:
         return 0.0, weights
+    level = _direction_with_fewest_tails(star, support)
+    over = star.over[level, support]
+    total = float(x[over].sum())
+    if total <= _SHORTFALL:
+        # Only points outside the affine hull of the triangulations can differ between directions.
+        return 0.0, weights
     # Turn the numbering so that the direction comes first: then only wedges over it go backwards.
-    turn = int(star.levels[-1]) + 1
-    position = (star.levels - level) % turn
-    sinks = np.unique(tails[over])
-    packed, weights[support] = _pack(position, tails, heads, x, over, sinks, programs)
+    position = (star.levels - level) % star.turn
+    packed, weights[support] = _pack(position, tails, heads, x, over, np.unique(tails[over]), programs)
     return total - packed, weights
 
 
 def _direction_with_fewest_tails(star: Star, support: NDArray[np.intp]) -> int:
-    turn = int(star.levels[-1]) + 1
-    first = star.levels[star.tails[support]]
-    span = (star.levels[star.heads[support]] - first) % turn
-    best, fewest = 0, star.size + 1
-    for level in range(turn):
-        over = (level - first - 1) % turn < span
-        number = len(set(star.tails[support[over]].tolist()))
-        if number < fewest:
-            best, fewest = level, number
-    return best
+    """Return the level before which the fewest tails have a wedge over it: each tail counts up to its widest wedge."""
+    widest = np.zeros(star.size, dtype=np.int64)
+    np.maximum.at(widest, star.tails[support], star.spans[support])
+    behind = np.arange(star.turn)[:, None] - star.levels - 1
+    return int((behind % star.turn < widest).sum(axis=1).argmin())
 
 
 def _pack(
@@ -263,7 +260,7 @@ _FAR = 1 << 40
 
 
 class _Walks:
-    """Least weights of paths between the nodes of a star, over two turns, as wedges are added.
+    """Least weights of paths of at most a turn between the nodes of a star, as wedges are added.
 
     Node i of the second turn is number size + i, so arcs only go forward, and a path from a head to its tail one turn
     later completes a once-winding walk.
@@ -284,11 +281,18 @@ class _Walks:
 
     def add(self, wedge: int, weight: int) -> None:
         """Allow paths to use a wedge, in both turns."""
-        for tail, head in ((self.tails[wedge], self.heads[wedge]), (self.tails[wedge] + self.size, self.heads[wedge] + self.size)):
-            if head < 2 * self.size:
-                through = self.least[: tail + 1, tail, None] + (weight + self.least[None, head, head:])
-                part = self.least[: tail + 1, head:]
-                np.minimum(part, through, out=part)
+        size, tail, head = self.size, int(self.tails[wedge]), int(self.heads[wedge])
+        if weight >= self.least[tail, head]:
+            return
+        # Paths of more than a turn are never asked for: they begin at most a turn before they end.
+        self._shorten(max(0, head - size), tail, head, min(tail + size, 2 * size - 1), weight)
+        if head < size:
+            self._shorten(head, tail + size, head + size, 2 * size - 1, weight)
+
+    def _shorten(self, first: int, tail: int, head: int, last: int, weight: int) -> None:
+        through = self.least[first : tail + 1, tail, None] + (weight + self.least[None, head, head : last + 1])
+        part = self.least[first : tail + 1, head : last + 1]
+        np.minimum(part, through, out=part)
 
     def rest(self, wedge: int) -> int:
         """Least weight of a path from the head of a wedge to its tail, one turn later."""

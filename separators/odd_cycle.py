@@ -49,7 +49,7 @@ class OddCycleCuts(Separator):
     name: ClassVar[str] = "odd-cycle"
 
     def __init__(
-        self, *, max_cuts: int = 100, backend: str = "scipy", max_nodes: int = 500, lift: int = 150
+        self, *, max_cuts: int = 50, backend: str = "scipy", max_nodes: int = 500, lift: int = 150
     ) -> None:
         if min(max_cuts, max_nodes) < 1 or lift < 0:
             raise ValueError("max_cuts and max_nodes are at least 1, lift at least 0")

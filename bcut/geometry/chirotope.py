@@ -88,6 +88,29 @@ class Chirotope:
             table[facet_ranks, subsets[:, position]] = -self.signs if (d - position) & 1 else self.signs
         return table
 
+    def joined(self, size: int) -> NDArray[np.int8]:
+        """Orientations of (s, t) for all subsets s of that size and all t with the other d + 1 - size points.
+
+        Shape (C(n, size), C(n, d + 1 - size)), by colexicographic ranks; zero where s and t share a point. `sides` is
+        ``joined(d)``, except that it is indexed by the point itself. Tables are kept.
+        """
+        if size not in self._joined:
+            d = self.dimension
+            table = np.zeros((comb(self.n, size), comb(self.n, d + 1 - size)), dtype=np.int8)
+            subsets = all_subsets(self.n, d + 1)
+            for first in all_subsets(d + 1, size).tolist():
+                second = [position for position in range(d + 1) if position not in first]
+                # Each position of the first part passes those of the second part below it.
+                swaps = sum(first) - size * (size - 1) // 2
+                rows, columns = ranks(subsets[:, first], self.n), ranks(subsets[:, second], self.n)
+                table[rows, columns] = -self.signs if swaps & 1 else self.signs
+            self._joined[size] = table
+        return self._joined[size]
+
+    @cached_property
+    def _joined(self) -> dict[int, NDArray[np.int8]]:
+        return {}
+
     @cached_property
     def facet_is_interior(self) -> NDArray[np.bool_]:
         """Whether each d-subset spans a (d-1)-simplex that lies in no facet of the convex hull, shape (C(n, d),)."""

@@ -11,6 +11,8 @@ Simplices share their faces, so the work is done once for each pair of faces, no
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +21,9 @@ from bcut.geometry.subsets import face_positions, ranks, without
 
 # Entries of a table that are worked on at once: what stays in a processor's cache, times a few.
 _CHUNK = 1 << 20
+
+# Entries of a table over all faces of complementary sizes; a larger one is computed where it is needed only.
+_LARGEST_TABLE = 1 << 27
 
 
 class FaceTable:
@@ -140,6 +145,9 @@ class CrossingTable:
             # A point passes the d points of a facet in d transpositions.
             sides = chirotope.sides[ranks(second, chirotope.n)][:, first[:, 0]].T
             return -sides if d & 1 else sides
+        if comb(chirotope.n, size) * comb(chirotope.n, d + 1 - size) <= _LARGEST_TABLE:
+            rows, columns = ranks(first, chirotope.n), ranks(second, chirotope.n)
+            return chirotope.joined(size)[rows[:, None], columns]
         result = np.empty((len(first), len(second)), dtype=np.int8)
         step = max(1, _CHUNK // (max(1, len(second)) * (d + 1)))
         for start in range(0, len(first), step):

@@ -8,6 +8,7 @@ directions themselves are the (d-1)-faces ``e + {a}``. All signs come from the c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -51,16 +52,25 @@ class Star:
         return len(self.points)
 
     @property
+    def turn(self) -> int:
+        """Number of directions."""
+        return int(self.levels[-1]) + 1
+
+    @cached_property
     def wraps(self) -> NDArray[np.bool_]:
-        """Whether each wedge contains the direction just before the first node."""
+        """Whether each wedge contains the direction just before the first node, shape (w,)."""
         return self.heads < self.tails
 
-    def over(self, level: int) -> NDArray[np.bool_]:
-        """Tell which wedges contain the generic direction just before a level, shape (w,)."""
-        turn = int(self.levels[-1]) + 1
-        first = self.levels[self.tails]
-        last = self.levels[self.heads] + turn * self.wraps
-        return ((first < level) & (last >= level)) | (last >= level + turn)
+    @cached_property
+    def spans(self) -> NDArray[np.int64]:
+        """How many directions each wedge turns by, shape (w,)."""
+        return (self.levels[self.heads] - self.levels[self.tails]) % self.turn
+
+    @cached_property
+    def over(self) -> NDArray[np.bool_]:
+        """Which wedges contain the generic direction just before each level, shape (turn, w)."""
+        behind = np.arange(self.turn)[:, None] - self.levels[self.tails] - 1
+        return behind % self.turn < self.spans
 
 
 class Stars:

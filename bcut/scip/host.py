@@ -16,8 +16,11 @@ from bcut.errors import SolverError
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.scip.model import build_model
-from bcut.scip.plugins import LpValues, Observer, SeparatorAdapter
+from bcut.scip.plugins import LpValues, Observer, RootRecord, SeparatorAdapter
 from bcut.separation.driver import IntegerCut, Separation
+
+# SCIP's own infinity: the largest time limit that it accepts.
+_LONGEST = 1e20
 
 TreeStatus = Literal["optimal", "infeasible", "limit", "interrupted"]
 
@@ -125,18 +128,19 @@ def branch_and_cut(
     model, variables = build_model(formulation, objective, cuts=cuts, name=formulation.configuration.name)
     _set_parameters(model, options)
     values = LpValues(variables)
-    adapter = _include_adapter(model, separation, values, options)
-    observer = Observer(objective, values, adapter, on_progress)
-    model.includeEventhdlr(observer, "bcut-observer", "records root bounds")
+    record = RootRecord(objective)
+    adapter = _include_adapter(model, separation, values, record, options)
+    observer = Observer(values, record, on_progress)
+    model.includeEventhdlr(observer, "bcut-observer", "records root bounds and reports progress")
     if start is not None:
         _add_start(model, variables, start)
     error = _optimize(model)
-    captured = (adapter.error if adapter else None) or observer.error
+    captured = adapter.error or observer.error
     if captured is not None:
         raise captured
     if error is not None:
         raise SolverError(f"SCIP failed on {formulation.configuration.name}: {error}") from error
-    result = _collect(model, variables, observer)
+    result = _collect(model, variables, record)
     result.seconds = time.perf_counter() - started
     model.freeProb()
     return result
@@ -147,7 +151,7 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
     # One Ctrl-C stops the search and keeps the incumbent.
     model.setParam("misc/catchctrlc", True)
     if options.seconds is not None:
-        model.setParam("limits/time", max(0.0, options.seconds))
+        model.setParam("limits/time", min(max(0.0, options.seconds), _LONGEST))
     if options.nodes is not None:
         model.setParam("limits/totalnodes", options.nodes)
     if options.cutoff is not None:
@@ -169,17 +173,19 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
 
 
 def _include_adapter(
-    model: Model, separation: Separation | None, values: LpValues, options: TreeOptions
-) -> SeparatorAdapter | None:
-    if separation is None or not separation.separators:
-        return None
-    adapter = SeparatorAdapter(separation, values, options.root_rounds, options.tree_rounds)
-    frequency = options.separate_every
+    model: Model, separation: Separation | None, values: LpValues, record: RootRecord, options: TreeOptions
+) -> SeparatorAdapter:
+    if separation is not None and not separation.separators:
+        separation = None
+    adapter = SeparatorAdapter(separation, values, record, options.root_rounds, options.tree_rounds)
+    # Without separators it records the rounds of the root.
+    frequency = 0 if separation is None else options.separate_every
     model.includeSepa(adapter, "bcut", "separators of bcut", priority=1_000_000, freq=frequency, delay=False)
     # By default SCIP calls a separator at depths 0, 1, 4, 16, ... whatever its frequency says.
     model.setParam("separating/bcut/expbackoff", 1)
-    # Rounds are limited by the adapter.
-    _unlimit_rounds(model)
+    if separation is not None:
+        # Rounds are limited by the adapter.
+        _unlimit_rounds(model)
     return adapter
 
 
@@ -207,7 +213,7 @@ def _optimize(model: Model) -> Exception | None:
     return None
 
 
-def _collect(model: Model, variables: list[Variable], observer: Observer) -> TreeResult:
+def _collect(model: Model, variables: list[Variable], record: RootRecord) -> TreeResult:
     status = model.getStatus()
     columns = None
     if model.getNSols() > 0:
@@ -220,7 +226,7 @@ def _collect(model: Model, variables: list[Variable], observer: Observer) -> Tre
         outcome = "optimal"
     elif status in ("infeasible", "inforunbd"):
         outcome = "infeasible"
-    elif status == "userinterrupt":
+    elif status in ("userinterrupt", "terminate"):
         outcome = "interrupted"
     elif status in ("timelimit", "nodelimit", "totalnodelimit", "memlimit", "gaplimit", "stallnodelimit"):
         outcome = "limit"
@@ -231,7 +237,7 @@ def _collect(model: Model, variables: list[Variable], observer: Observer) -> Tre
         columns,
         None if abs(bound) >= model.infinity() else float(bound),
         int(model.getNTotalNodes()),
-        observer.rounds,
+        record.rounds,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,17 @@ from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut, Separation
 
 
+# The first relaxation of a node, and the last one after separation. GAPUPDATED is a mask over other types of events.
+_LP_EVENTS = (SCIP_EVENTTYPE.FIRSTLPSOLVED, SCIP_EVENTTYPE.LPSOLVED)
+
+
 def _lp_is_optimal(model: Any) -> bool:
     """Tell whether there is an LP solution to read; outside the solving stage even asking for its status is an error."""
     return model.getStage() == SCIP_STAGE.SOLVING and model.getLPSolstat() == SCIP_LPSOLSTAT.OPTIMAL
+
+
+def _at_root(model: Any) -> bool:
+    return model.getDepth() == 0 and model.getNNodes() <= 1
 
 
 class LpValues:
@@ -39,19 +48,55 @@ class LpValues:
         return np.array([model.getSolVal(None, variable) for variable in self.originals])
 
 
+class RootRecord:
+    """The relaxations of the root, one after the other, unrounded."""
+
+    def __init__(self, objective: Objective) -> None:
+        self.costs = objective.costs
+        self.rounds: list[Round] = []
+        self._started = time.perf_counter()
+
+    def add(self, x: NDArray[np.float64], cuts: dict[str, int]) -> None:
+        """Record a relaxation point and the cuts then added, by family.
+
+        SCIP shows the same relaxation more than once; where nothing happened in between, it stays one round.
+        """
+        value = float(self.costs @ x)
+        seconds = time.perf_counter() - self._started
+        if self.rounds and not self.rounds[-1].cuts and isclose(self.rounds[-1].lp, value, abs_tol=1e-9):
+            seconds += self.rounds.pop().seconds
+        self.rounds.append(Round(value, cuts, seconds))
+        self._started = time.perf_counter()
+
+
 class SeparatorAdapter(Sepa):
-    """One SCIP separator that runs all of ours, one after the other.
+    """One SCIP separator that runs all of ours, one after the other, and records the rounds of the root.
 
     What a separator raises would be swallowed by SCIP, so it is kept in `error`, the solve is interrupted, and
     the host raises it afterwards.
+
+    Parameters
+    ----------
+    separation : Separation or None
+        None only records.
+    values : LpValues
+    record : RootRecord
+    max_root_rounds, max_tree_rounds : int
+        Rounds per node.
     """
 
-    def __init__(self, separation: Separation, values: LpValues, max_root_rounds: int, max_tree_rounds: int) -> None:
+    def __init__(
+        self,
+        separation: Separation | None,
+        values: LpValues,
+        record: RootRecord,
+        max_root_rounds: int,
+        max_tree_rounds: int,
+    ) -> None:
         self.separation = separation
-        self.values = values
+        self.values, self.record = values, record
         self.max_root_rounds, self.max_tree_rounds = max_root_rounds, max_tree_rounds
         self.error: BaseException | None = None
-        self.added_by_family: dict[str, int] = {}
         self._node, self._rounds = -1, 0
 
     def sepainitsol(self) -> None:
@@ -60,34 +105,44 @@ class SeparatorAdapter(Sepa):
 
     def sepaexeclp(self) -> dict[str, Any]:
         """Separate the LP solution of the current node."""
-        try:
-            return {"result": self._execute()}
-        except BaseException as error:
-            self.error = error
-            self.model.interruptSolve()
-            return {"result": SCIP_RESULT.DIDNOTRUN}
+        # After an error SCIP may ask once more before it notices the interrupt; the first error is the one to report.
+        if self.error is None:
+            try:
+                return {"result": self._execute()}
+            except BaseException as error:
+                self.error = error
+                self.model.interruptSolve()
+        return {"result": SCIP_RESULT.DIDNOTRUN}
 
     def _execute(self) -> Any:
         model = self.model
-        if not _lp_is_optimal(model) or not self._within_rounds():
+        if not _lp_is_optimal(model):
             return SCIP_RESULT.DIDNOTRUN
-        cuts = self.separation.round(self.values.read(model))
-        added = False
-        for cut in cuts:
+        x = self.values.read(model)
+        counts: dict[str, int] = {}
+        result = self._separate(x, counts) if self._within_rounds() else SCIP_RESULT.DIDNOTRUN
+        if _at_root(model):
+            self.record.add(x, counts)
+        return result
+
+    def _separate(self, x: NDArray[np.float64], counts: dict[str, int]) -> Any:
+        """Add the cuts for a point; counts them by family."""
+        assert self.separation is not None
+        for cut in self.separation.round(x):
             infeasible = self._add(cut)
             self.separation.confirm(cut)
-            self.added_by_family[cut.family] = self.added_by_family.get(cut.family, 0) + 1
+            counts[cut.family] = counts.get(cut.family, 0) + 1
             if infeasible:
                 return SCIP_RESULT.CUTOFF
-            added = True
-        return SCIP_RESULT.SEPARATED if added else SCIP_RESULT.DIDNOTFIND
+        return SCIP_RESULT.SEPARATED if counts else SCIP_RESULT.DIDNOTFIND
 
     def _within_rounds(self) -> bool:
+        if self.separation is None:
+            return False
         node = self.model.getCurrentNode().getNumber()
         self._rounds = self._rounds + 1 if node == self._node else 1
         self._node = node
-        at_root = self.model.getDepth() == 0
-        return self._rounds <= (self.max_root_rounds if at_root else self.max_tree_rounds)
+        return self._rounds <= (self.max_root_rounds if self.model.getDepth() == 0 else self.max_tree_rounds)
 
     def _add(self, cut: IntegerCut) -> bool:
         """Add one globally valid row; tell whether SCIP found the node infeasible by it."""
@@ -104,60 +159,36 @@ class SeparatorAdapter(Sepa):
 
 
 class Observer(Eventhdlr):
-    """Records the root LP per round, unrounded, and reports progress."""
+    """Records the first and the last relaxation of the root, and reports progress."""
 
     def __init__(
-        self,
-        objective: Objective,
-        values: LpValues,
-        adapter: SeparatorAdapter | None,
-        on_progress: Callable[[dict[str, Any]], None] | None,
+        self, values: LpValues, record: RootRecord, on_progress: Callable[[dict[str, Any]], None] | None
     ) -> None:
-        self.costs = objective.costs
-        self.values, self.adapter, self.on_progress = values, adapter, on_progress
-        self.rounds: list[Round] = []
+        self.values, self.record, self.on_progress = values, record, on_progress
         self.error: BaseException | None = None
-        self._started = time.perf_counter()
-        self._counted: dict[str, int] = {}
 
     def eventinit(self) -> None:
         """Subscribe."""
-        self.model.catchEvent(SCIP_EVENTTYPE.LPSOLVED, self)
-        self.model.catchEvent(SCIP_EVENTTYPE.GAPUPDATED, self)
+        for kind in (*_LP_EVENTS, SCIP_EVENTTYPE.GAPUPDATED):
+            self.model.catchEvent(kind, self)
 
     def eventexit(self) -> None:
         """Unsubscribe."""
-        self.model.dropEvent(SCIP_EVENTTYPE.LPSOLVED, self)
-        self.model.dropEvent(SCIP_EVENTTYPE.GAPUPDATED, self)
+        for kind in (*_LP_EVENTS, SCIP_EVENTTYPE.GAPUPDATED):
+            self.model.dropEvent(kind, self)
 
     def eventexec(self, event: Any) -> None:
         """Record a root relaxation, or report a new bound or incumbent."""
+        if self.error is not None:
+            return
         try:
-            if event.getType() == SCIP_EVENTTYPE.GAPUPDATED:
+            if event.getType() not in _LP_EVENTS:
                 self._report()
-            elif self.model.getDepth() == 0 and self.model.getNNodes() <= 1:
-                self._record()
+            elif _at_root(self.model) and _lp_is_optimal(self.model):
+                self.record.add(self.values.read(self.model), {})
         except BaseException as error:
             self.error = error
             self.model.interruptSolve()
-
-    def _record(self) -> None:
-        model = self.model
-        if not _lp_is_optimal(model):
-            return
-        self._attribute_cuts()
-        value = float(self.costs @ self.values.read(model))
-        self.rounds.append(Round(value, {}, time.perf_counter() - self._started))
-        self._started = time.perf_counter()
-
-    def _attribute_cuts(self) -> None:
-        """Credit the cuts added since the last relaxation to that round."""
-        if self.adapter is None or not self.rounds:
-            return
-        now = dict(self.adapter.added_by_family)
-        new = {name: count - self._counted.get(name, 0) for name, count in now.items()}
-        self._counted = now
-        self.rounds[-1].cuts.update({name: count for name, count in new.items() if count})
 
     def _report(self) -> None:
         if self.on_progress is None:

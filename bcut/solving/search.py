@@ -193,6 +193,10 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     search.rounds.extend(("tree", finished) for finished in tree.rounds)
     if tree.columns is not None:
         search.offer(part.columns[tree.columns])
+    if search.lp is None and tree.rounds:
+        search.lp, search.lp_after_cuts = tree.rounds[0].lp, tree.rounds[-1].lp
     if tree.bound is not None and cutoff is None:
-        search.raise_bound(Fraction(search.sign * tree.bound))
+        # Within SCIP's tolerance: a bound of 22.0000001 must not be rounded up to 23.
+        bound = Fraction(search.sign * tree.bound)
+        search.raise_bound(bound - Fraction(max(1, abs(bound)), 10**6))
     return tree.status

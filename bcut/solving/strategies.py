@@ -16,22 +16,31 @@ def solve_by_targets(search: Search) -> None:
     """Solve where every triangulation has an integral value.
 
     The smallest value that the root bound allows is a target. Only columns whose reduced cost is at most target - bound
-    can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP searches what is left. Either a
-    triangulation reaches the target, which is then optimal, or none does, and the target moves up by one.
+    can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP searches what is left. Either some
+    triangulation reaches the target, and the best of those is optimal, or none does, and the target moves up: by one at
+    first, then in growing steps, since with large costs there may be many values below the optimum.
     """
     root = bound_at_root(search, search.whole, None)
     if root.first is None:
         return
     search.exact = root.first
     search.raise_bound(Fraction(ceil(root.first.value)))
+    refuted = 0
     while not _is_optimal(search):
         assert search.bound is not None
-        target = search.bound
+        step = max(1, abs(search.bound) // 1000) << max(0, refuted - 1)
+        target = search.bound + step - 1
+        if search.value is not None:
+            target = min(target, search.sign * search.value - 1)
         columns = search.exact.columns_within(target)
         outcome = _reach(search, search.whole.restricted_to(columns), target)
         if outcome == "refuted":
+            refuted += 1
             search.raise_bound(target + 1)
-        elif outcome != "reached":
+        elif outcome == "reached":
+            assert search.value is not None
+            search.raise_bound(search.sign * search.value)
+        else:
             search.status = outcome
             return
     search.status = "optimal"
@@ -45,21 +54,24 @@ def _is_optimal(search: Search) -> bool:
 def _reach(
     search: Search, part: Part, target: Fraction
 ) -> Literal["reached", "refuted", "limit", "interrupted"]:
-    """Look for a triangulation of the target value (times sign) on a part that contains all of them."""
+    """Find a best triangulation on a part that contains all those with at most the target value (times sign)."""
     root = bound_at_root(search, part, search.separation(part), target=target)
     search.columns_after_fixing = len(root.columns)
     if root.status in ("infeasible", "target"):
         return "refuted"
     if root.status == "integral":
         # An optimum of the part: if it misses the target, no triangulation reaches it.
-        return "reached" if _is_optimal(search) else "refuted"
+        assert search.value is not None
+        return "reached" if search.sign * search.value <= target else "refuted"
     if search.seconds_left == 0.0:
         return "limit"
     # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target + 1/2.
     status = branch(search, part, root, cutoff=float(search.sign * (target + Fraction(1, 2))))
     if status == "infeasible":
         return "refuted"
-    return "reached" if _is_optimal(search) else "interrupted" if status == "interrupted" else "limit"
+    if status == "optimal" or _is_optimal(search):
+        return "reached"
+    return "interrupted" if status == "interrupted" else "limit"
 
 
 def solve_at_once(search: Search) -> None:
