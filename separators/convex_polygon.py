@@ -124,3 +124,161 @@ class Lines:
             for b in members[i + 1 :]:
                 result |= self.on[a][b]
         return result & ~points
+
+
+def violated_polygons(
+    lines: Lines, triangles: NDArray[np.integer], values: NDArray[np.floating], effort: int
+) -> list[tuple[list[int], float]]:
+    """Find the empty convex polygons whose cuts a point violates most.
+
+    Parameters
+    ----------
+    lines : Lines
+        Of the configuration.
+    triangles : ndarray of int, shape (k, 3)
+        Those with a positive value.
+    values : ndarray of float, shape (k,)
+    effort : int
+        Minimum cuts, at most.
+
+    Returns
+    -------
+    list of (list of int, float)
+        Polygons as ascending vertices, with their violations, most violated first. Each is a most violated one among
+        those that contain some triangle and none of the triangles of larger value; so the first one is best of all.
+    """
+    search = _Search(lines, effort)
+    order = np.argsort(-values, kind="stable")
+    profits = {sum(1 << v for v in triangles[i].tolist()): float(values[i]) for i in order}
+    remaining = dict(profits)
+    found: dict[int, float] = {}
+    for triangle in profits:
+        polygon = search.best_around(triangle, remaining)
+        if polygon:
+            inside = sum(x for other, x in profits.items() if not other & ~polygon)
+            found[polygon] = inside - polygon.bit_count() + 2
+        # What contains this triangle is dealt with.
+        del remaining[triangle]
+    ranked = sorted(found, key=lambda polygon: (-found[polygon], polygon))
+    return [(list(_bits(polygon)), found[polygon]) for polygon in ranked]
+
+
+class _Search:
+    """Branch and bound over points that are in, points that may come in, and points that are out."""
+
+    def __init__(self, lines: Lines, effort: int) -> None:
+        self.lines, self.effort = lines, effort
+        self.best, self.best_violation = 0, _MARGIN
+
+    def best_around(self, triangle: int, profits: dict[int, float]) -> int:
+        """Return the most violated polygon that contains a triangle, 0 if none is violated."""
+        self.best, self.best_violation = 0, _MARGIN
+        if not self.lines.inside(triangle):
+            everything = (1 << self.lines.n) - 1
+            self._branch(triangle, everything & ~triangle, profits)
+        return self.best
+
+    def _branch(self, inner: int, candidates: int, profits: dict[int, float]) -> None:
+        if self.effort <= 0:
+            return
+        allowed = 0
+        for point in _bits(candidates):
+            if not self.lines.inside(inner | 1 << point):
+                allowed |= 1 << point
+        usable = {triangle: x for triangle, x in profits.items() if not triangle & ~(inner | allowed)}
+        chosen = inner | self._closure(inner, allowed, usable)
+        violation = sum(x for triangle, x in usable.items() if not triangle & ~chosen) - chosen.bit_count() + 2
+        if violation <= self.best_violation:
+            return
+        obstacle = self._obstacle(chosen, inner)
+        if obstacle is None:
+            self.best, self.best_violation = chosen, violation
+            return
+        culprits, remedy = obstacle
+        for point in _bits(culprits & ~inner):
+            allowed &= ~(1 << point)
+            self._branch(inner, allowed, usable)
+            inner |= 1 << point
+        if remedy & allowed and not self.lines.inside(inner | remedy):
+            self._branch(inner | remedy, allowed & ~remedy, usable)
+
+    def _obstacle(self, chosen: int, inner: int) -> tuple[int, int] | None:
+        """Return points of which one must go, and a point that makes good for it when it comes in; None if all is well."""
+        inside = self.lines.inside(chosen)
+        if inside:
+            obstacle = inside & -inside
+            # A minimal set around the obstacle: at most four points, as many as possible of those that are in anyway.
+            for point in [*_bits(chosen & ~inner), *_bits(inner)]:
+                if self.lines.inside(chosen & ~(1 << point)) & obstacle:
+                    chosen &= ~(1 << point)
+            return chosen, 0
+        between = self.lines.between(chosen)
+        if not between:
+            return None
+        missing = _lowest(between)
+        members = list(_bits(chosen))
+        for i, a in enumerate(members):
+            for b in members[i + 1 :]:
+                if self.lines.on[a][b] >> missing & 1:
+                    return 1 << a | 1 << b, 1 << missing
+        raise AssertionError("a point between two others has these two")
+
+    def _closure(self, inner: int, allowed: int, usable: dict[int, float]) -> int:
+        """Return the points to add to `inner` so that profits minus 1 per point added are largest, whatever their shape."""
+        profits: dict[int, float] = {}
+        for triangle, x in usable.items():
+            needed = triangle & ~inner
+            if needed:
+                profits[needed] = profits.get(needed, 0.0) + x
+        # A point whose triangles together do not pay for it is in no best set.
+        while allowed:
+            income = dict.fromkeys(_bits(allowed), 0.0)
+            for needed, x in profits.items():
+                for point in _bits(needed):
+                    income[point] += x
+            poor = sum(1 << point for point, x in income.items() if x <= 1.0)
+            if not poor:
+                break
+            allowed &= ~poor
+            profits = {needed: x for needed, x in profits.items() if not needed & poor}
+        if not allowed:
+            return 0
+        self.effort -= 1
+        return _closure_by_minimum_cut(allowed, profits)
+
+
+def _closure_by_minimum_cut(points: int, profits: dict[int, float]) -> int:
+    """Return the set of points whose profits (of the sets that it contains) minus 1 per point are largest."""
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
+    number = {point: 1 + len(profits) + i for i, point in enumerate(_bits(points))}
+    sink = 1 + len(profits) + len(number)
+    # Capacities are 32-bit integers; no finite cut is larger than the sum of the profits.
+    unit = 2.0**30 / max(2.0, 2.0 * sum(profits.values()))
+    arcs: list[tuple[int, int, int]] = [(node, sink, round(unit)) for node in number.values()]
+    for i, (needed, x) in enumerate(profits.items()):
+        arcs.append((0, 1 + i, round(unit * x)))
+        arcs.extend((1 + i, number[point], 2**30) for point in _bits(needed))
+    tails, heads, capacities = np.array(arcs, dtype=np.int32).T
+    graph = sp.csr_matrix((capacities, (tails, heads)), shape=(sink + 1, sink + 1))
+    residual = graph - maximum_flow(graph, 0, sink).flow
+    residual.data[residual.data < 0] = 0
+    residual.eliminate_zeros()
+    reached = set(breadth_first_order(residual, 0, return_predecessors=False).tolist())
+    return sum(1 << point for point, node in number.items() if node in reached)
+
+
+def _mask(flags: NDArray[np.bool_]) -> int:
+    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
+
+
+def _lowest(mask: int) -> int:
+    return (mask & -mask).bit_length() - 1
+
+
+def _bits(mask: int) -> Iterator[int]:
+    while mask:
+        low = mask & -mask
+        yield low.bit_length() - 1
+        mask ^= low

@@ -7,6 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_sc
 DEFAULT_SEPARATORS = ("link",)
 FORMULATIONS: dict[str, Callable[..., Formulation]] = {"2": cocircuit_formulation}
 METHODS = ("auto", "scip")
+LARGEST_TARGET_COST = 1e6
 
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
@@ -137,7 +139,10 @@ def bound(
 def _choose(method: str, search: Search) -> Callable[[Search], None]:
     if method == "scip":
         return solve_in_scip
-    return solve_by_targets if search.whole.objective.is_integral else solve_at_once
+    objective = search.whole.objective
+    # Solvers tell neighbouring integers apart only where values are not too large.
+    small = float(np.abs(objective.costs).max(initial=0.0)) <= LARGEST_TARGET_COST
+    return solve_by_targets if objective.is_integral and small else solve_at_once
 
 
 class _Run:
@@ -239,8 +244,8 @@ def _check_options(formulation: str, time_limit: float | None, seed: int, method
         raise InputError(f"unknown formulation '{formulation}': known are {', '.join(FORMULATIONS)}")
     if method not in METHODS:
         raise InputError(f"unknown method '{method}': known are {', '.join(METHODS)}")
-    if time_limit is not None and not time_limit >= 0:
-        raise InputError(f"time limit {time_limit}: give a number of seconds that is not negative")
+    if time_limit is not None and not 0 <= time_limit < inf:
+        raise InputError(f"time limit {time_limit}: give a finite number of seconds that is not negative")
     if seed < 0:
         raise InputError(f"seed {seed}: give an integer that is not negative")
 
