@@ -17,8 +17,10 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from bcut.errors import BcutError as BcutError
+    from bcut.files.registry import write_points as write_points
     from bcut.geometry.configuration import PointConfiguration as PointConfiguration
     from bcut.instance import load_instance as load_instance
+    from bcut.plotting.plot import plot as plot
     from bcut.result import Result as Result
     from bcut.separation.check import check_separator as check_separator
     from bcut.separation.seam import Cut as Cut
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from bcut.separation.seam import Separator as Separator
     from bcut.solving.api import bound as bound
     from bcut.solving.api import solve as solve
+    from bcut.solving.export import export as export
+    from bcut.solving.information import info as info
     from bcut.verification.verify import verify as verify
 
 _HOMES = {
@@ -39,9 +43,13 @@ _HOMES = {
     "Separator": "bcut.separation.seam",
     "bound": "bcut.solving.api",
     "check_separator": "bcut.separation.check",
+    "export": "bcut.solving.export",
+    "info": "bcut.solving.information",
     "load_instance": "bcut.instance",
+    "plot": "bcut.plotting.plot",
     "solve": "bcut.solving.api",
     "verify": "bcut.verification.verify",
+    "write_points": "bcut.files.registry",
 }
 
 __all__ = ["__version__", *sorted(_HOMES)]

@@ -15,19 +15,23 @@ _UNIT = 1 << 30
 # A clique counts as violated from this much above 1 on.
 _MARGIN = _UNIT // 10_000
 
+# What is spent on making a violated clique heavier, in coloured nodes.
+_POLISH = 500
+
 # Candidates for lifting that are tried, per simplex that is added.
 _POOL = 4
 
 
-class CliqueCuts(Separator):
-    """Cuts ``sum of x over a clique of the crossing graph <= 1`` (the paper, Sec. 2.5).
+class Clique(Separator):
+    """Of simplices that cross each other pairwise, at most one: cliques of the crossing graph, lifted.
 
-    All simplices over one generic point form a clique, and Formulation 2 fixes their sum to 1: such cliques are never
-    violated there. What is found is a clique without a common point.
+    The cuts are ``sum of x over the clique <= 1`` (the paper, Sec. 2.5). All simplices over one generic point
+    form a clique, and Formulation 2 fixes their sum to 1: such cliques are never violated there. What is
+    found is a clique without a common point.
 
-    For each fractional simplex that is in no clique yet, the heaviest clique through it is sought by branch and bound
-    with a weighted colouring as bound; a search that takes too long ends with the best clique so far. Every clique
-    is then extended by simplices that cross all its members, whatever their value.
+    For each fractional simplex that is in no clique yet, the heaviest clique through it is sought by branch
+    and bound with a weighted colouring as bound; a search that takes too long ends with the best clique so
+    far. Every clique is then extended by simplices that cross all its members, whatever their value.
 
     Parameters
     ----------
@@ -36,14 +40,16 @@ class CliqueCuts(Separator):
     max_nodes : int
         Only that many fractional simplices, those of largest value, are looked at.
     effort : int
-        Search nodes per point, about; each simplex gets its share.
+        Simplices that all colourings of the search together may colour, about; every search gets its share.
     lift : int
         At most this many simplices of value zero are added to each clique.
     """
 
     name: ClassVar[str] = "clique"
 
-    def __init__(self, *, max_cuts: int = 50, max_nodes: int = 500, effort: int = 4_000, lift: int = 150) -> None:
+    def __init__(
+        self, *, max_cuts: int = 50, max_nodes: int = 500, effort: int = 100_000, lift: int = 150
+    ) -> None:
         if min(max_cuts, max_nodes, effort) < 1 or lift < 0:
             raise ValueError("max_cuts, max_nodes and effort are at least 1, lift at least 0")
         self.max_cuts, self.max_nodes, self.effort, self.lift = max_cuts, max_nodes, effort, lift
@@ -62,8 +68,8 @@ class CliqueCuts(Separator):
         """Add simplices that cross all members and each other, as many as are found in one pass."""
         members = [int(column) for column in clique]
         if self.lift:
-            candidates = np.flatnonzero(self.problem.crossing_rows(clique).all(axis=0))
-            candidates = self.problem.nearest_first(candidates, clique)
+            crossed = np.flatnonzero(self.problem.crossing_rows(clique).all(axis=0))
+            candidates = self.problem.nearest_first(crossed, clique)
             candidates = candidates[np.argsort(-point.x[candidates], kind="stable")][: _POOL * self.lift]
             crossings = self.problem.crossings(candidates)
             allowed = np.ones(len(candidates), dtype=bool)
@@ -75,9 +81,7 @@ class CliqueCuts(Separator):
         return np.array(sorted(members), dtype=np.int64)
 
 
-def heavy_cliques(
-    crossings: NDArray[np.bool_], values: NDArray[np.floating], effort: int
-) -> list[list[int]]:
+def heavy_cliques(crossings: NDArray[np.bool_], values: NDArray[np.floating], effort: int) -> list[list[int]]:
     """Find cliques of weight above 1 that cover as many nodes as possible.
 
     Parameters
@@ -87,23 +91,24 @@ def heavy_cliques(
     values : ndarray of float, shape (k,)
         Weights of the nodes, at least 0.
     effort : int
-        Search nodes, about.
+        Nodes that all colourings together may colour, about.
 
     Returns
     -------
     list of list of int
-        Each ascending and maximal, none twice.
+        Each ascending, none twice.
     """
     order = np.lexsort((np.arange(len(values)), -values))
     crossings, values = crossings[np.ix_(order, order)], values[order]
     search = _Search(crossings, values)
     cliques: dict[tuple[int, ...], None] = {}
     covered = 0
-    # Nodes with little around them first: those that are in no heavy clique are done with, and leave the graph.
+    # Nodes with little around them first: those that are in no heavy clique are done with, and leave the
+    # graph.
     for node in np.argsort(crossings @ values, kind="stable").tolist():
         if covered >> node & 1:
             continue
-        clique = search.heaviest_through(node, effort // len(values) + 10)
+        clique = search.heaviest_through(node, effort // len(values) + len(values))
         if clique:
             covered |= clique
             cliques.setdefault(tuple(sorted(order[list(_bits(clique))].tolist())))
@@ -131,10 +136,12 @@ class _Search:
         return self.best
 
     def _grow(self, clique: int, weight: int, candidates: int) -> None:
-        self.effort -= 1
+        self.effort -= 1 + candidates.bit_count()
         if not candidates:
             if weight > self.best_weight:
                 self.best, self.best_weight = clique, weight
+                # What counts is that it is violated: little is spent on making it more so.
+                self.effort = min(self.effort, _POLISH)
             return
         for node, bound in self._coloured(candidates, self.best_weight - weight):
             if weight + bound <= self.best_weight or self.effort <= 0:
@@ -145,8 +152,8 @@ class _Search:
     def _coloured(self, candidates: int, slack: int) -> list[tuple[int, int]]:
         """List nodes with a bound on the weight of a clique in the nodes listed after them and themselves.
 
-        Nodes are covered by stable sets with multiplicities; a clique has at most one node of each. Nodes within the
-        first `slack` of the cover cannot lead to anything better and are left out.
+        Nodes are covered by stable sets with multiplicities; a clique has at most one node of each. Nodes
+        within the first `slack` of the cover cannot lead to anything better and are left out.
         """
         residual = {node: self.weight[node] for node in _bits(candidates)}
         listed: list[tuple[int, int]] = []

@@ -1,26 +1,27 @@
-"""Convex polygon cuts (2D): a triangulation has at most b - 2 triangles in a convex polygon through b points that is empty.
+"""Convex polygon cuts (2D): an empty convex polygon through b points has room for b - 2 triangles.
 
 Definition
 ----------
-Let V be the points of the configuration in their own convex hull, none of them in its interior, b in number (points inside
-an edge of the polygon count). A triangulation's triangles with vertices in V have disjoint interiors, and can be completed
-to a triangulation of the polygon; one that uses all of V has b - 2 triangles, and none has more:
+Let V be all points of the configuration in a convex polygon, none of them in its interior, b in number (points
+inside an edge of the polygon count). Triangles of a triangulation with vertices in V overlap nowhere, so their
+angles, pi for each triangle, fit into the angles of the polygon at the points of V, pi (b - 2) together:
 
     sum of x over the triangles with vertices in V  <=  b - 2.
 
-This is Definition 1 of the paper with no interior points. For a point of Formulation 2 no such cut is violated: at each
-vertex v of V, the triangles of V at v cover every direction into the polygon with total value at most 1, so the sum of x times
-the angle at v is at most the polygon's angle there; summed over all vertices, pi times the left side is at most pi (b - 2).
-That settles the paper's Conjecture 1. Points of Formulations 0 and 1, and points that are given by hand, can violate it.
+This is Definition 1 of the paper with no interior points. A point x of Formulation 2 never violates it: in a
+direction from v into the polygon, the triangles of V at v have a total value of at most 1, because all of them
+contain the same chamber at v; so their angles times x fit as well. That is the paper's Conjecture 1. Points of
+Formulations 0 and 1, and points that are given by hand, can violate it.
 
 Separation
 ----------
-The left side counts all triangles of V, not those of one fan, so it is not a sum along the chain of V's edges, and dynamic
-programming over convex chains does not apply. But without the condition of being empty and convex, the best set is easy:
-choose triangles with profit x, each of which needs its three vertices at cost 1. That is a maximum-weight closure, one
-minimum cut. For each triangle of positive value that V may contain, branch and bound asks for the best set by a minimum
-cut, and where it is not empty and convex, a point in its way lies in the hull of few of its points: one of these must go.
-If all points are in convex position the first minimum cut is the answer; otherwise the polygons around one triangle are few.
+The left side counts all triangles of V, not those of one fan, so it is not a sum along the chain of V's
+edges, and dynamic programming over convex chains does not apply. But without the condition of being empty and
+convex, the best set is easy: choose triangles with profit x, each of which needs its three vertices at cost
+1. That is a maximum-weight closure, one minimum cut. For each triangle of positive value that V may contain,
+branch and bound asks for the best set by a minimum cut, and where it is not empty and convex, a point in its
+way lies in the hull of few of its points: one of these must go. If all points are in convex position the
+first minimum cut is the answer; otherwise the polygons around one triangle are few.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 _MARGIN = 1e-4
 
 
-class ConvexPolygonCuts(Separator):
-    """Exact separation of the cuts of empty convex polygons; in dimensions other than 2 there are none.
+class ConvexPolygon(Separator):
+    """In an empty convex polygon through b points, at most b - 2 triangles: in the plane only, exact.
 
     Parameters
     ----------
@@ -63,34 +64,38 @@ class ConvexPolygonCuts(Separator):
             self.lines = Lines(problem.chirotope)
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
-        """Yield the cuts of violated polygons: the most violated one around each triangle, most violated first."""
+        """Yield the cuts of violated polygons, at most one around each triangle, most violated first."""
         if self.problem.dimension != 2:
             return
-        found = violated_polygons(self.lines, self.problem.simplices[point.support], point.x[point.support], self.effort)
+        found = violated_polygons(
+            self.lines, self.problem.simplices[point.support], point.x[point.support], self.effort
+        )
         for polygon, _ in found[: self.max_cuts]:
             columns = np.flatnonzero(np.isin(self.problem.simplices, polygon).all(axis=1))
             yield Cut(columns, len(polygon) - 2, proof={"polygon": polygon})
 
 
 class Lines:
-    """The lines through two points of a planar configuration, as sets of points on each side; sets are bit masks.
+    """The lines through two points of a planar configuration, and the points beside them, as bit masks.
 
     Attributes
     ----------
     left, on : list of list of int
-        For an ordered pair (a, b), the points strictly on the left of the line from a to b, and those strictly between a
-        and b.
+        For an ordered pair (a, b), the points strictly on the left of the line from a to b, and those
+        strictly between a and b.
     """
 
     def __init__(self, chirotope: Chirotope) -> None:
         n = self.n = chirotope.n
         self.left = [[0] * n for _ in range(n)]
         self.on = [[0] * n for _ in range(n)]
+        self._free: dict[tuple[int, int], int] = {}
         collinear: dict[tuple[int, int], int] = {}
         for (a, b), sides in zip(chirotope.facets.tolist(), chirotope.sides, strict=True):
             self.left[a][b], self.left[b][a] = _mask(sides > 0), _mask(sides < 0)
             collinear[a, b] = _mask(sides == 0) & ~(1 << a | 1 << b)
-        # A point r of the line through a and b is between them when some point off the line sees them in the order a, r, b.
+        # A point r of the line through a and b is between them when some point off the line sees them in the
+        # order a, r, b.
         for (a, b), others in collinear.items():
             if others:
                 viewer = _lowest(self.left[a][b] | self.left[b][a])
@@ -105,6 +110,13 @@ class Lines:
         if not self.left[a][b] >> c & 1:
             a, b = b, a
         return self.left[a][b] & self.left[b][c] & self.left[c][a]
+
+    def free(self, a: int, b: int) -> int:
+        """Return the points that span no triangle with a and b that has a point strictly inside."""
+        if (a, b) not in self._free:
+            others = _bits(((1 << self.n) - 1) & ~(1 << a | 1 << b))
+            self._free[a, b] = sum(1 << c for c in others if not self.in_triangle(a, b, c))
+        return self._free[a, b]
 
     def inside(self, points: int) -> int:
         """Return all points of the configuration strictly inside the convex hull of some."""
@@ -144,8 +156,9 @@ def violated_polygons(
     Returns
     -------
     list of (list of int, float)
-        Polygons as ascending vertices, with their violations, most violated first. Each is a most violated one among
-        those that contain some triangle and none of the triangles of larger value; so the first one is best of all.
+        Polygons as ascending vertices, with their violations, most violated first. Each is a most violated
+        one among those that contain some triangle and none of the triangles of larger value; so the first one
+        is best of all.
     """
     search = _Search(lines, effort)
     order = np.argsort(-values, kind="stable")
@@ -181,13 +194,12 @@ class _Search:
     def _branch(self, inner: int, candidates: int, profits: dict[int, float]) -> None:
         if self.effort <= 0:
             return
-        allowed = 0
-        for point in _bits(candidates):
-            if not self.lines.inside(inner | 1 << point):
-                allowed |= 1 << point
+        allowed = self._compatible(inner, candidates)
         usable = {triangle: x for triangle, x in profits.items() if not triangle & ~(inner | allowed)}
         chosen = inner | self._closure(inner, allowed, usable)
-        violation = sum(x for triangle, x in usable.items() if not triangle & ~chosen) - chosen.bit_count() + 2
+        violation = (
+            sum(x for triangle, x in usable.items() if not triangle & ~chosen) - chosen.bit_count() + 2
+        )
         if violation <= self.best_violation:
             return
         obstacle = self._obstacle(chosen, inner)
@@ -202,12 +214,21 @@ class _Search:
         if remedy & allowed and not self.lines.inside(inner | remedy):
             self._branch(inner | remedy, allowed & ~remedy, usable)
 
+    def _compatible(self, inner: int, candidates: int) -> int:
+        """Return those candidates each of which spans with `inner` a polygon that has nothing inside."""
+        members = list(_bits(inner))
+        for i, a in enumerate(members):
+            for b in members[i + 1 :]:
+                candidates &= self.lines.free(a, b)
+        return sum(1 << point for point in _bits(candidates) if not self.lines.inside(inner | 1 << point))
+
     def _obstacle(self, chosen: int, inner: int) -> tuple[int, int] | None:
-        """Return points of which one must go, and a point that makes good for it when it comes in; None if all is well."""
+        """Return points of which one must go, unless another one, also returned, comes in; None if all is well."""
         inside = self.lines.inside(chosen)
         if inside:
             obstacle = inside & -inside
-            # A minimal set around the obstacle: at most four points, as many as possible of those that are in anyway.
+            # A minimal set around the obstacle: at most four points, as many as possible of those that are in
+            # anyway.
             for point in [*_bits(chosen & ~inner), *_bits(inner)]:
                 if self.lines.inside(chosen & ~(1 << point)) & obstacle:
                     chosen &= ~(1 << point)
@@ -224,7 +245,7 @@ class _Search:
         raise AssertionError("a point between two others has these two")
 
     def _closure(self, inner: int, allowed: int, usable: dict[int, float]) -> int:
-        """Return the points to add to `inner` so that profits minus 1 per point added are largest, whatever their shape."""
+        """Return the points to add to `inner` for the largest profit minus 1 per point, whatever their shape."""
         profits: dict[int, float] = {}
         for triangle, x in usable.items():
             needed = triangle & ~inner

@@ -239,9 +239,13 @@ def lift_weights(
         With these no once-winding closed walk weighs less than alpha.
     """
     walks = _Walks(star)
-    for wedge, weight in sorted(zip(support.tolist(), weights.tolist(), strict=True), key=lambda item: walks.first(item[0])):
+    for wedge, weight in sorted(
+        zip(support.tolist(), weights.tolist(), strict=True), key=lambda item: walks.first(item[0])
+    ):
         walks.add(wedge, weight)
-    shortest = min((walks.rest(wedge) + weight for wedge, weight in zip(support.tolist(), weights.tolist(), strict=True)))
+    shortest = min(
+        (walks.rest(wedge) + weight for wedge, weight in zip(support.tolist(), weights.tolist(), strict=True))
+    )
     alpha = int(shortest) if shortest < _FAR else max(1, int(weights.max(initial=1)))
     # A wedge of weight alpha makes every walk through it heavy enough: the safe choice to start from.
     extended = np.full(len(star.columns), alpha, dtype=np.int64)
@@ -290,7 +294,9 @@ class _Walks:
             self._shorten(head, tail + size, head + size, 2 * size - 1, weight)
 
     def _shorten(self, first: int, tail: int, head: int, last: int, weight: int) -> None:
-        through = self.least[first : tail + 1, tail, None] + (weight + self.least[None, head, head : last + 1])
+        through = self.least[first : tail + 1, tail, None] + (
+            weight + self.least[None, head, head : last + 1]
+        )
         part = self.least[first : tail + 1, head : last + 1]
         np.minimum(part, through, out=part)
 

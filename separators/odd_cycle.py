@@ -1,4 +1,4 @@
-"""Odd-cycle cuts: of an odd number k of simplices that cross in a cycle, a triangulation contains at most (k - 1) / 2."""
+"""Odd-cycle cuts: of k simplices that cross in a cycle, k odd, at most (k - 1) / 2 are in a triangulation."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ _REACH = 1.1
 _POOL = 4
 
 
-class OddCycleCuts(Separator):
-    """Cuts ``sum of x over an odd cycle of the crossing graph <= (k - 1) / 2``, lifted (the paper, Sec. 2.5).
+class OddCycle(Separator):
+    """Of k simplices that cross in a cycle, k odd, at most (k - 1) / 2: odd holes, lifted.
 
-    With edge lengths ``1 - x_u - x_v`` the cut is violated exactly when the cycle is shorter than 1. A shortest odd
-    closed walk through a node v is a shortest path between the two copies of v in the bipartite double cover of the
-    graph. Such a walk is cut down to a cycle without chords, which is violated at least as much: the rest of the walk is
+    The cuts are ``sum of x over the cycle <= (k - 1) / 2`` (the paper, Sec. 2.5). With edge lengths ``1 - x_u
+    - x_v`` the cut is violated exactly when the cycle is shorter than 1. A shortest odd closed walk through a
+    node v is a shortest path between the two copies of v in the bipartite double cover of the graph. Such a
+    walk is cut down to a cycle without chords, which is violated at least as much: the rest of the walk is
     even, and edges cover it. Three simplices that cross pairwise are a cycle, too.
 
-    Each cycle is then lifted, one simplex after another: a simplex w gets the coefficient ``rhs - (the most that the cut's
-    left side can be on pairwise non-crossing simplices that do not cross w)``, which is what is valid for any
-    triangulation that contains w, by the definition of that maximum. For a simplex that crosses the whole cycle it is
-    (k - 1) / 2: an odd wheel.
+    Each cycle is then lifted, one simplex after another: a simplex w gets the coefficient ``rhs - (the most
+    that the cut's left side can be on pairwise non-crossing simplices that do not cross w)``, which is what
+    is valid for any triangulation that contains w, by the definition of that maximum. For a simplex that
+    crosses the whole cycle it is (k - 1) / 2: an odd wheel.
 
     Parameters
     ----------
@@ -40,8 +41,9 @@ class OddCycleCuts(Separator):
     backend : {"scipy", "networkx"}
         What finds the shortest paths; the cycles' lengths are the same.
     max_nodes : int
-        Only that many fractional simplices, those of largest value, are looked at. Where no crossing pair is violated, a
-        cycle through v is violated by x_v at most, because edges cover the rest of it: little is lost.
+        Only that many fractional simplices, those of largest value, are looked at. Where no crossing pair is
+        violated, a cycle through v is violated by x_v at most, because edges cover the rest of it: little is
+        lost.
     lift : int
         At most this many simplices are lifted into each cycle.
     """
@@ -70,8 +72,8 @@ class OddCycleCuts(Separator):
             if violation > _MARGIN:
                 cycles.setdefault(_turned(cycle), violation)
         ranked = sorted(cycles, key=lambda cycle: (-cycles[cycle], cycle))
-        for cycle in ranked[: self.max_cuts]:
-            members = columns[list(cycle)]
+        for nodes in ranked[: self.max_cuts]:
+            members = columns[list(nodes)]
             lifted, coefficients = self.lifted(members, point)
             yield Cut(
                 np.concatenate((members, lifted)),
@@ -80,7 +82,9 @@ class OddCycleCuts(Separator):
                 proof={"cycle": members.tolist(), "lifted": lifted.tolist()},
             )
 
-    def lifted(self, cycle: NDArray[np.integer], point: FractionalPoint) -> tuple[NDArray[np.int64], list[int]]:
+    def lifted(
+        self, cycle: NDArray[np.integer], point: FractionalPoint
+    ) -> tuple[NDArray[np.int64], list[int]]:
         """Return simplices to add to a chordless cycle, and their coefficients, all positive."""
         if not self.lift:
             return np.empty(0, dtype=np.int64), []
@@ -91,7 +95,7 @@ class OddCycleCuts(Separator):
         nodes = np.concatenate((cycle, candidates))
         coefficients = sequential_lifting(len(cycle), self.problem.crossings(nodes), self.lift)
         chosen = np.flatnonzero(coefficients)
-        return candidates[chosen], coefficients[chosen].tolist()
+        return candidates[chosen].astype(np.int64), coefficients[chosen].tolist()
 
 
 def _most_useful(
@@ -102,9 +106,7 @@ def _most_useful(
     return candidates[np.lexsort((np.arange(len(candidates)), -gains, -added))]
 
 
-def _lifted_violation(
-    cycle: list[int], crossings: NDArray[np.bool_], values: NDArray[np.floating]
-) -> float:
+def _lifted_violation(cycle: list[int], crossings: NDArray[np.bool_], values: NDArray[np.floating]) -> float:
     """Return by how much the cycle's cut is violated when simplices of positive value are lifted into it."""
     gains = hole_gains(crossings[cycle])
     gains[cycle] = 0
@@ -135,8 +137,7 @@ def odd_closed_walks(
     """
     rows, columns = np.nonzero(crossings)
     lengths = np.maximum(0.0, 1.0 - values[rows] - values[columns])
-    short = lengths < _REACH
-    yield from _BACKENDS[backend](len(values), rows[short], columns[short], lengths[short])
+    yield from _BACKENDS[backend](len(values), rows, columns, lengths)
 
 
 def _walks_by_scipy(
@@ -197,7 +198,7 @@ def chordless_cycle(walk: Sequence[int], crossings: NDArray[np.bool_]) -> list[i
 
 
 def _shortest_odd_part(cycle: list[int], crossings: NDArray[np.bool_]) -> list[int] | None:
-    """Return the shortest odd cycle made of one chord and a part of an odd cycle; None where there is no chord."""
+    """Return the shortest odd cycle made of a chord and a part of an odd cycle; None if there is no chord."""
     size = len(cycle)
     among = crossings[np.ix_(cycle, cycle)]
     for part in range(3, size, 2):  # an odd number of consecutive nodes, closed by a chord
@@ -217,7 +218,7 @@ def _turned(cycle: Sequence[int]) -> tuple[int, ...]:
 
 
 def hole_gains(crossing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the coefficient that each column could get if it were the only one lifted into a chordless odd cycle.
+    """Return the coefficient that each column gets when it alone is lifted into a chordless odd cycle.
 
     Parameters
     ----------
@@ -227,8 +228,8 @@ def hole_gains(crossing: NDArray[np.bool_]) -> NDArray[np.int64]:
     Returns
     -------
     ndarray of int, shape (m,)
-        (k - 1) / 2 minus the most pairwise non-crossing nodes of the cycle that the column does not cross: each run
-        of r such nodes between two crossed ones has (r + 1) // 2.
+        (k - 1) / 2 minus the most pairwise non-crossing nodes of the cycle that the column does not cross:
+        each run of r such nodes between two crossed ones has (r + 1) // 2.
     """
     size, count = crossing.shape
     most = np.zeros(count, dtype=np.int64)
@@ -277,7 +278,7 @@ def sequential_lifting(size: int, crossings: NDArray[np.bool_], most: int) -> ND
 
 
 def heaviest_stable(nodes: int, adjacent: Sequence[int], weights: dict[int, int], cap: int) -> int:
-    """Return the largest weight of a stable set among some nodes of a graph, exactly, or `cap` if it is at least that.
+    """Return the largest weight of a stable set among some nodes of a graph, or `cap` if that is less.
 
     Parameters
     ----------

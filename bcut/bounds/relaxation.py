@@ -144,6 +144,8 @@ class Relaxation:
         import highspy
 
         solver = self._solver
+        if not len(self._costs):
+            raise InfeasibleRelaxationError  # the coverage row asks for a simplex; HiGHS calls this "empty"
         if not self._interior_point and len(self._costs) >= _INTERIOR_POINT_FROM:
             limit = int(_SIMPLEX_ITERATIONS * self.formulation.matrix.shape[0])
             solver.setOptionValue("simplex_iteration_limit", limit)
@@ -154,6 +156,11 @@ class Relaxation:
             status = self._run()
         elif not self.cuts:
             self._interior_point = False
+        if status not in _answers(highspy.HighsModelStatus):
+            # Interior point may end without an answer; the simplex method from scratch is slow, but sure.
+            solver.clearSolver()
+            self._interior_point = False
+            status = self._run()
         if status == highspy.HighsModelStatus.kTimeLimit:
             return None
         if status == highspy.HighsModelStatus.kInfeasible:
@@ -201,6 +208,10 @@ class Relaxation:
 
 class InfeasibleRelaxationError(Exception):
     """The relaxation has no point: with the columns at hand there is no triangulation."""
+
+
+def _answers(statuses: Any) -> tuple[Any, ...]:
+    return statuses.kOptimal, statuses.kInfeasible, statuses.kTimeLimit
 
 
 def _with_infinities(sides: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -42,7 +42,9 @@ class LazyGroup(click.Group):
     epilog="Exit status: 0 done, 2 bad usage or input, 3 a limit came first, 5 a plug-in or the solver failed, "
     "130 interrupted.",
 )
-@click.version_option(__version__, prog_name="bcut", message="%(prog)s %(version)s", help="Show the version and exit.")
+@click.version_option(
+    __version__, prog_name="bcut", message="%(prog)s %(version)s", help="Show the version and exit."
+)
 def bcut() -> None:
     """Find provably optimal triangulations of point configurations, by branch-and-cut.
 
@@ -54,8 +56,11 @@ def bcut() -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status; every message goes to standard error."""
     try:
-        status: Any = bcut.main(None if arguments is None else list(arguments), prog_name="bcut", standalone_mode=False)
-    except click.exceptions.Abort:
+        status: Any = bcut.main(
+            None if arguments is None else list(arguments), prog_name="bcut", standalone_mode=False
+        )
+    except (click.exceptions.Abort, KeyboardInterrupt):  # click turns the one into the other
+        print("Interrupted before anything was found.", file=sys.stderr)
         return ExitStatus.INTERRUPTED
     except click.ClickException as error:
         error.show()
@@ -63,9 +68,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BcutError as error:
         _complain(error)
         return error.exit_status
-    except KeyboardInterrupt:
-        print("bcut: interrupted before anything was found", file=sys.stderr)
-        return ExitStatus.INTERRUPTED
     return int(status or 0)
 
 

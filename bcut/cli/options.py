@@ -11,8 +11,6 @@ import click
 Command = TypeVar("Command", bound=Callable[..., Any])
 Decorator = Callable[[Command], Command]
 
-INSTANCE_HELP = "A file of points, or a member of a family (`bcut generate --list`)."
-
 
 def _together(*decorators: Decorator[Any]) -> Decorator[Any]:
     """Apply decorators so that the help lists the options in the order given here."""
@@ -59,7 +57,7 @@ separator_options = _together(
         multiple=True,
         metavar="NAME|FILE",
         help="A cut family at work, repeatable: a name, a file, each with :parameter=value,... "
-        "(`bcut separators list`). Without this option: clique and odd-cycle.",
+        "(`bcut separators list`). Without this option: link.",
     ),
     click.option("--no-separators", is_flag=True, help="Put no cut family to work."),
 )
@@ -72,11 +70,18 @@ run_options = _together(
         help="Stop after S seconds with what was found (exit status 3).",
     ),
     click.option(
-        "--seed", type=int, default=0, show_default=True, metavar="N", help="Seed of the solver's random choices."
+        "--seed",
+        type=int,
+        default=0,
+        show_default=True,
+        metavar="N",
+        help="Seed of the solver's random choices.",
     ),
 )
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of the summary.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print one JSON object instead of the summary."
+)
 
 report_options = _together(
     click.option(
@@ -87,6 +92,8 @@ report_options = _together(
     ),
     json_option,
     click.option(
-        "--quiet", is_flag=True, help="No summary and no progress: only the data that --json or --output asks for."
+        "--quiet",
+        is_flag=True,
+        help="No summary and no progress: only the data that --json or --output asks for.",
     ),
 )

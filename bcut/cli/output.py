@@ -25,7 +25,9 @@ def emit(text: str) -> None:
         _discard_standard_output()
     except OSError as error:
         _discard_standard_output()
-        raise InputError(f"standard output cannot be written ({error.strerror}); redirect it elsewhere") from None
+        raise InputError(
+            f"standard output cannot be written ({error.strerror}); redirect it elsewhere"
+        ) from None
 
 
 def emit_json(data: Any) -> None:

@@ -32,7 +32,6 @@ def carry_out(
     int
         The exit status of the program.
     """
-    from bcut.cli.native import native_output_hidden
     from bcut.cli.progress import progress_line
     from bcut.cli.summary import summary
 
@@ -40,7 +39,7 @@ def carry_out(
         raise click.UsageError("--separator and --no-separators contradict each other; drop one of them")
     check_output(output, instance)
     separators = [] if no_separators else list(separator) or None
-    with native_output_hidden(), progress_line(quiet=quiet) as on_progress:
+    with progress_line(quiet=quiet) as on_progress:
         result = call(instance, separators=separators, on_progress=on_progress, **options)
     if output is not None:
         result.save(output)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,33 +16,38 @@ from bcut.errors import InputError
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`, which takes its place when the block ends without an error.
 
+    A symbolic link stays, and the file behind it is replaced.
+
     Raises
     ------
     InputError
-        If the folder does not exist or cannot be written to.
+        If the folder does not exist or cannot be written to, or the disk is full.
     """
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
+        target = Path(os.path.realpath(path))
+        temporary = _empty_file_beside(target)
+        try:
+            yield temporary
+            # mkstemp gives owner-only permissions; a new file gets what the user's umask says.
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(temporary, 0o666 & ~umask)
+            os.replace(temporary, target)
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(temporary)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
-    os.close(handle)
-    try:
-        yield Path(temporary)
-        # mkstemp gives owner-only permissions; a new file gets what the user's umask says.
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        try:
-            os.replace(temporary, path)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(temporary)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
+    """Write a text file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -52,11 +58,32 @@ def check_writable(path: Path) -> None:
     Raises
     ------
     InputError
-        If `path` is a folder, or its folder does not exist or cannot be written to.
+        If `path` is a folder or a device, or its folder does not exist or cannot be written to.
     """
-    if path.is_dir():
+    target = Path(os.path.realpath(path))
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        mode = None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+    if mode is not None and stat.S_ISDIR(mode):
         raise InputError(f"{path}: is a folder; name a file")
-    if not path.parent.is_dir():
+    if mode is not None and not stat.S_ISREG(mode):
+        raise InputError(f"{path}: is no regular file; name a file, or use the standard output")
+    if not target.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}; make it first")
-    if not os.access(path.parent, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
-        raise InputError(f"{path}: cannot be written; choose another place")
+    if mode is not None and not os.access(target, os.W_OK):
+        raise InputError(f"{path}: is write-protected; choose another place")
+    try:
+        # Permissions do not tell everything, a read-only disk for instance: try it.
+        os.unlink(_empty_file_beside(target))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+
+
+def _empty_file_beside(target: Path) -> Path:
+    """Make an empty file of the same suffix in the same folder; its name is short whatever that of `target` is."""
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".bcut-", suffix=target.suffix)
+    os.close(handle)
+    return Path(temporary)

@@ -91,8 +91,8 @@ class Chirotope:
     def joined(self, size: int) -> NDArray[np.int8]:
         """Orientations of (s, t) for all subsets s of that size and all t with the other d + 1 - size points.
 
-        Shape (C(n, size), C(n, d + 1 - size)), by colexicographic ranks; zero where s and t share a point. `sides` is
-        ``joined(d)``, except that it is indexed by the point itself. Tables are kept.
+        Shape (C(n, size), C(n, d + 1 - size)), by colexicographic ranks; zero where s and t share a point.
+        ``joined(d)`` is `sides`. Tables are kept.
         """
         if size not in self._joined:
             d = self.dimension

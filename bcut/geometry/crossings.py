@@ -1,10 +1,11 @@
 """Which simplices cross: pairs that no triangulation contains together.
 
-Two simplices A and B meet in a common face unless some circuit (Z+, Z-) has Z+ in A and Z- in B. Such a circuit extends
-by vertices of A to a (d+2)-subset that spans the space, split into a face s of A and a face t of B. So A and B cross
-exactly when they have disjoint faces s and t, with d + 2 vertices together, for which the one affine dependence on s and t
-is weakly positive on s and weakly negative on t. In general position "weakly" changes nothing, and this is Proposition 1
-of the paper; with it the statement holds for every configuration.
+Two simplices A and B meet in a common face unless some circuit (Z+, Z-) has Z+ in A and Z- in B. Such a
+circuit extends by vertices of A to a (d+2)-subset that spans the space, split into a face s of A and a face t
+of B. So A and B cross exactly when they have disjoint faces s and t, with d + 2 vertices together, for which
+the one affine dependence on s and t is weakly positive on s and weakly negative on t. In general position
+"weakly" changes nothing, and this is Proposition 1 of the paper; with it the statement holds for every
+configuration.
 
 Simplices share their faces, so the work is done once for each pair of faces, not of simplices.
 """
@@ -87,7 +88,8 @@ class CrossingTable:
         """
         d = self.chirotope.dimension
         left = FaceTable(simplices, self.chirotope.n)
-        # One bit for each given simplex, in one row for each fixed one: a face then passes on all its bits at once.
+        # One bit for each given simplex, in one row for each fixed one: a face then passes on all its bits at
+        # once.
         crossing = np.zeros((self.table.count, (left.count + 7) // 8), dtype=np.uint8)
         omitting = self._orientations(left, 0)
         for size in range(1, d + 2):
@@ -106,8 +108,8 @@ class CrossingTable:
         """Tell which faces with `size` vertices cross which fixed faces with d + 2 - size vertices.
 
         By Cramer's rule the affine dependence on the points (s, t) has at the i-th of them the coefficient
-        (-1)^i times the orientation of the others. `omitting` holds the orientations with one vertex of s left out,
-        `keeping` those with one vertex of t left out.
+        (-1)^i times the orientation of the others. `omitting` holds the orientations with one vertex of s
+        left out, `keeping` those with one vertex of t left out.
         """
         d = self.chirotope.dimension
         faces, others = left.faces[size], self.table.faces[d + 2 - size]
@@ -117,7 +119,8 @@ class CrossingTable:
         for start in range(0, len(faces), step):
             part = slice(start, start + step)
             signs = [(1, i, omitting[left_boundary[part, i]]) for i in range(size)]
-            # The sign on t is turned round, so that a crossing shows one sign only; none at all means no full rank.
+            # The sign on t is turned round, so that a crossing shows one sign only; none at all means no full
+            # rank.
             signs += [(-1, size + j, keeping[part][:, rows]) for j, rows in enumerate(right_boundary.T)]
             plus, minus = np.zeros((2, *signs[0][2].shape), dtype=bool)
             for turned, position, coefficient in signs:
@@ -133,9 +136,9 @@ class CrossingTable:
         return result
 
     def _orientations(self, left: FaceTable, size: int) -> NDArray[np.int8]:
-        """Orientations of (s, t) for faces s of `left` with `size` vertices and fixed faces t with d + 1 - size.
+        """Orientations of (s, t) for faces s of `left` with `size` vertices and fixed faces t with the rest.
 
-        In this order of the vertices; zero where s and t share one.
+        The rest is d + 1 - size; zero where s and t share a vertex.
         """
         chirotope, d = self.chirotope, self.chirotope.dimension
         first, second = left.faces[size], self.table.faces[d + 1 - size]
@@ -151,12 +154,14 @@ class CrossingTable:
         result = np.empty((len(first), len(second)), dtype=np.int8)
         step = max(1, _CHUNK // (max(1, len(second)) * (d + 1)))
         for start in range(0, len(first), step):
-            result[start : start + step] = _joined_orientations(chirotope, first[start : start + step], second)
+            result[start : start + step] = _joined_orientations(
+                chirotope, first[start : start + step], second
+            )
         return result
 
 
 def _packed_by_column(faces: NDArray[np.bool_], incidence: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Join the rows of each simplex's faces and return, for each column, the simplices that have it, as packed bits."""
+    """Join the rows of each simplex's faces; return for each column the simplices that have it, as bits."""
     rows = np.packbits(faces, axis=1)
     step = max(8, _CHUNK // max(1, faces.shape[1]) // 8 * 8)
     parts = []
@@ -169,7 +174,7 @@ def _packed_by_column(faces: NDArray[np.bool_], incidence: NDArray[np.int32]) ->
 def _joined_orientations(
     chirotope: Chirotope, first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> NDArray[np.int8]:
-    """Orientations of all concatenations (s, t), zero where a point occurs twice, shape (len(first), len(second))."""
+    """Orientations of all concatenations (s, t), zero where a point occurs twice."""
     shape = (len(first), len(second))
     inversions = np.zeros(shape, dtype=np.int64)
     repeated = np.zeros(shape, dtype=bool)

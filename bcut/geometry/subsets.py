@@ -75,6 +75,9 @@ def without(subsets: NDArray[np.integer], position: int) -> NDArray[np.integer]:
     return subsets[..., keep]
 
 
+@lru_cache(maxsize=256)
 def face_positions(size: int, face_size: int) -> Indices:
-    """Return the positions of all faces with `face_size` vertices in a simplex with `size` vertices."""
-    return all_subsets(size, face_size)
+    """Return the positions of all faces with `face_size` vertices in a simplex with `size`, read-only."""
+    table = all_subsets(size, face_size)
+    table.setflags(write=False)
+    return table

@@ -28,6 +28,9 @@ Measure = Callable[[PointConfiguration, Simplices, str], Costs]
 
 MEASURES: dict[str, Measure] = {}
 
+# "source" and "known" are for people.
+_KEYS = {"default", "costs", "source", "known"}
+
 # A text such as "1e999999999" has a billion digits when it is written out.
 _LONG_EXPONENT = re.compile(r"[eE][+-]?\d{4}")
 
@@ -78,7 +81,7 @@ def read_costs(
 ) -> tuple[Fraction, dict[tuple[int, ...], Fraction]]:
     """Read a costs file: the default, and the exact cost of each listed simplex (ascending vertices)."""
     data = _read_json(path)
-    if not isinstance(data, dict) or set(data) - {"default", "costs"} or "costs" not in data:
+    if not isinstance(data, dict) or set(data) - _KEYS or "costs" not in data:
         raise InputError(f'costs file {path}: expected {{"default": 1, "costs": [[[0, 1, 2], 0], ...]}}')
     if not isinstance(data["costs"], list):
         raise InputError(f"costs file {path}: 'costs' must be a list of [simplex, cost] pairs")

@@ -57,8 +57,8 @@ def back_to_front(corners: Floats, towards: Floats) -> list[int]:
 def _hidden_pairs(corners: Floats, towards: Floats) -> list[tuple[int, int]]:
     """Return the pairs (behind, in front) that overlap in projection.
 
-    Two convex polytopes with disjoint interiors are separated by a plane parallel to a face of one or to an edge of each
-    (the separating axis theorem); one behind the other, the side of the viewer tells which. They do not
+    Two convex polytopes with disjoint interiors are separated by a plane parallel to a face of one or to an edge of
+    each (the separating axis theorem), and the viewer's side of that plane tells which of them is in front. They do not
     overlap exactly when some separating plane contains the viewing direction.
     """
     spread = float(np.abs(corners - corners.mean(axis=(0, 1))).max()) or 1.0
@@ -74,7 +74,9 @@ def _hidden_pairs(corners: Floats, towards: Floats) -> list[tuple[int, int]]:
         count = len(corners) - first - 1
         own = np.concatenate((faces[first], silhouettes[first]))
         crosses = np.cross(edges[first][None, :, None, :], edges[rest][:, None, :, :]).reshape(count, -1, 3)
-        axes = np.concatenate((np.broadcast_to(own, (count, *own.shape)), faces[rest], silhouettes[rest], crosses), axis=1)
+        axes = np.concatenate(
+            (np.broadcast_to(own, (count, *own.shape)), faces[rest], silhouettes[rest], crosses), axis=1
+        )
         norms = np.linalg.norm(axes, axis=2, keepdims=True)
         axes = np.divide(axes, norms, out=np.zeros_like(axes), where=norms > _TOLERANCE)
         here, there = axes @ scaled[first].T, np.einsum("cak,cvk->cav", axes, scaled[rest])

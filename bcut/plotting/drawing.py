@@ -44,10 +44,12 @@ def draw_plane(figure: Figure, points: Floats, triangles: Simplices, *, labels: 
     """
     axes = figure.add_subplot()
     colours = neighbour_colours(triangles)
-    axes.add_collection(PolyCollection(points[triangles], facecolors=colours, edgecolors=_INK, linewidths=0.9))
+    axes.add_collection(
+        PolyCollection(list(points[triangles]), facecolors=colours, edgecolors=_INK, linewidths=0.9)
+    )
     used = np.isin(np.arange(len(points)), triangles)
-    axes.scatter(*points[used].T, s=22, color=_INK, zorder=3)
-    axes.scatter(*points[~used].T, s=22, facecolor="white", edgecolor=_INK, zorder=3)
+    axes.scatter(points[used, 0], points[used, 1], s=22, color=_INK, zorder=3)
+    axes.scatter(points[~used, 0], points[~used, 1], s=22, facecolor="white", edgecolor=_INK, zorder=3)
     _finish(axes, points, labels)
 
 
@@ -86,7 +88,7 @@ def draw_space(
     )
     flat = _projected(points)
     if not explode:
-        axes.scatter(*flat.T, s=18, color=_INK, zorder=3)
+        axes.scatter(flat[:, 0], flat[:, 1], s=18, color=_INK, zorder=3)
     _finish(axes, flat, labels)
 
 

@@ -91,9 +91,13 @@ def _triangulation(
     source = result if isinstance(result, Mapping | str | os.PathLike) else result.to_dict()
     data, label = load_result(source)
     if data.triangulation is None:
-        raise InputError(f"{label}: has no triangulation to draw (status '{data.status}'); solve the instance")
+        raise InputError(
+            f"{label}: has no triangulation to draw (status '{data.status}'); solve the instance"
+        )
     if data.dimension not in (2, 3):
-        raise InputError(f"{label}: is of dimension {data.dimension}; pictures are drawn in dimension 2 and 3")
+        raise InputError(
+            f"{label}: is of dimension {data.dimension}; pictures are drawn in dimension 2 and 3"
+        )
     points = PointConfiguration.from_values(data.points, name=data.name, origin=label).floats
     size = data.dimension + 1
     fits = points.shape[1] == data.dimension and all(

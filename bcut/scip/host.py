@@ -15,6 +15,7 @@ from bcut.bounds.root import Round
 from bcut.errors import SolverError
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
+from bcut.scip.console import native_output_to_stderr
 from bcut.scip.model import build_model
 from bcut.scip.plugins import LpValues, Observer, RootRecord, SeparatorAdapter
 from bcut.separation.driver import IntegerCut, Separation
@@ -207,7 +208,8 @@ def _add_start(model: Model, variables: list[Variable], start: NDArray[np.intege
 def _optimize(model: Model) -> Exception | None:
     """Run SCIP; an exception here is either its own or a symptom of one captured in a callback."""
     try:
-        model.optimize()
+        with native_output_to_stderr():
+            model.optimize()
     except Exception as error:
         return error
     return None

@@ -15,7 +15,6 @@ from bcut.bounds.root import Round
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut, Separation
 
-
 # The first relaxation of a node, and the last one after separation. GAPUPDATED is a mask over other types of events.
 _LP_EVENTS = (SCIP_EVENTTYPE.FIRSTLPSOLVED, SCIP_EVENTTYPE.LPSOLVED)
 

@@ -118,13 +118,13 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
     right = floor(rhs * scale / divisor)
     coprime = [integers[i] // divisor for i in keep]
     if max(abs(value) for value in (right, *coprime)) >= 2**62:
-        raise UnusableCutError
+        raise UnusableCutError(family, "a cut has numbers of more than 62 bits as coprime integers; no solver can use it")
     coefficients = np.array(coprime, dtype=np.int64)
     return IntegerCut(family, indices[keep].astype(np.int64), coefficients, right, cut.proof)
 
 
-class UnusableCutError(Exception):
-    """A well-formed cut with numbers that no solver can use."""
+class UnusableCutError(SeparatorError):
+    """A well-formed cut with numbers that no solver can use; a host drops it."""
 
 
 def _exact(value: Any, family: str) -> Fraction:

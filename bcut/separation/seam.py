@@ -1,9 +1,10 @@
 """The separator seam: `Separator`, `Cut`, and the read-only view of a problem that a separator is shown.
 
-A separator knows no solver. It is told about the problem once (`Separator.setup`), and is then shown fractional points
-(`Separator.separate`) and yields inequalities over d-simplices. The host does everything else: it checks violations,
-scales, filters duplicates, limits, times and counts, and names the separator when it raises. The same class
-runs inside SCIP, in the plain cutting-plane loop of ``bcut bound``, and in a test on a hand-made point.
+A separator knows no solver. It is told about the problem once (`Separator.setup`), and is then shown
+fractional points (`Separator.separate`) and yields inequalities over d-simplices. The host does everything
+else: it checks violations, scales, filters duplicates, limits, times and counts, and names the separator when
+it raises. The same class runs inside SCIP, in the plain cutting-plane loop of ``bcut bound``, and in a test
+on a hand-made point.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ from bcut.geometry.crossings import CrossingTable, crossing_matrix
 # Values closer than this to 0 or 1 count as integral: SCIP's feasibility tolerance.
 TOLERANCE = 1e-6
 
+# Up to this many columns the whole crossing graph is computed once, and kept.
+_SMALL = 4096
+
 # Rows of the crossing graph that a problem remembers, in bytes: a row is one bit per column.
 _ROW_CACHE = 1 << 27
 
@@ -45,7 +49,8 @@ class Cut:
     coefficients : sequence of int or Fraction, optional
         Exact, one for each simplex; all 1 when omitted.
     proof : mapping
-        What makes the inequality valid, as JSON-ready data (the clique, the cycle, the face and its weights, ...).
+        What makes the inequality valid, as JSON-ready data (the clique, the cycle, the face and its weights,
+        ...).
     """
 
     simplices: Sequence[int] | NDArray[np.integer]
@@ -90,6 +95,8 @@ class Problem:
         self, columns: NDArray[np.integer], others: NDArray[np.integer] | None = None
     ) -> NDArray[np.bool_]:
         """Tell which simplices cross, shape (len(columns), len(others)); `others` defaults to `columns`."""
+        if len(self.simplices) <= _SMALL:
+            return self._all_crossings[np.ix_(columns, columns if others is None else others)]
         rest = None if others is None else self.simplices[others]
         return crossing_matrix(self.chirotope, self.simplices[columns], rest)
 
@@ -98,6 +105,8 @@ class Problem:
 
         Rows are remembered, because separators come back to the same simplices from round to round.
         """
+        if len(self.simplices) <= _SMALL:
+            return self._all_crossings[columns]
         asked = np.asarray(columns).tolist()
         missing = [column for column in dict.fromkeys(asked) if column not in self._rows]
         if missing:
@@ -121,13 +130,17 @@ class Problem:
     def nearest_first(
         self, candidates: NDArray[np.integer], columns: NDArray[np.integer]
     ) -> NDArray[np.integer]:
-        """Sort candidates by how often their vertices occur among `columns`, larger simplices first among equals.
+        """Sort candidates by how often their vertices occur among `columns`; of equals, larger ones first.
 
         A good order for lifting: the simplices that a relaxation turns to next are made of the same points.
         """
         occurrences = np.bincount(self.simplices[columns].ravel(), minlength=self.configuration.n)
         shared = occurrences[self.simplices[candidates]].sum(axis=1)
         return candidates[np.lexsort((candidates, -self.volumes[candidates], -shared))]
+
+    @cached_property
+    def _all_crossings(self) -> NDArray[np.bool_]:
+        return crossing_matrix(self.chirotope, self.simplices)
 
     @cached_property
     def _crossing_table(self) -> CrossingTable:
@@ -195,8 +208,8 @@ class FractionalPoint:
 class Separator(ABC):
     """Base class of all cut families.
 
-    A family is a subclass with a `name`. Its parameters are the keyword arguments of its constructor, each with a
-    default; on the command line they are written ``name:parameter=value,...``.
+    A family is a subclass with a `name`. Its parameters are the keyword arguments of its constructor, each
+    with a default; on the command line they are written ``name:parameter=value,...``.
 
     Examples
     --------

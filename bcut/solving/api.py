@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 import bcut
-from bcut.errors import InputError, SolverError
+from bcut.errors import InputError, SeparatorLoadError, SolverError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.configuration import PointConfiguration
-from bcut.geometry.placing import placing_triangulation
 from bcut.instance import load_instance
 from bcut.objectives.measures import read_costs
 from bcut.objectives.objective import Objective, make_objective
@@ -27,7 +26,7 @@ from bcut.separation.driver import check_names
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Separator
 from bcut.solving.certificates import make_certificate, rounded
-from bcut.solving.search import Part, Progress, Search, bound_at_root
+from bcut.solving.search import Part, Progress, Search, bound_at_root, place
 from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_scip
 
 DEFAULT_SEPARATORS = ("link",)
@@ -98,9 +97,7 @@ def solve(
     except KeyboardInterrupt:
         search.status = "interrupted"
     if search.columns is None and search.status != "infeasible":
-        # Whatever stopped the search, there always is a triangulation to hand out.
-        placed = placing_triangulation(run.configuration, run.formulation.chirotope)
-        search.offer(run.formulation.columns_of(placed))
+        place(search)
     return run.finish()
 
 
@@ -253,7 +250,10 @@ def _check_options(formulation: str, time_limit: float | None, seed: int, method
 def _make(item: SeparatorLike) -> Separator:
     if isinstance(item, str):
         return resolve(item)
-    return item() if isinstance(item, type) else item
+    made: Any = item() if isinstance(item, type) else item
+    if not isinstance(made, Separator):
+        raise SeparatorLoadError(f"{item!r} is no separator: give a name, a file, or a bcut.Separator")
+    return made
 
 
 def _describe(item: SeparatorLike) -> str:

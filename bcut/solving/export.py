@@ -42,7 +42,9 @@ def export(
     """
     target = Path(path)
     if target.suffix not in MODEL_SUFFIXES:
-        raise InputError(f"{target}: unknown suffix '{target.suffix}'; models are written as {', '.join(MODEL_SUFFIXES)}")
+        raise InputError(
+            f"{target}: unknown suffix '{target.suffix}'; models are written as {', '.join(MODEL_SUFFIXES)}"
+        )
     check_writable(target)
     if formulation not in FORMULATIONS:
         raise InputError(f"unknown formulation '{formulation}': known are {', '.join(FORMULATIONS)}")

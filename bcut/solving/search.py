@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from bcut.bounds.root import RootBound, RootLimits, Round, root_bound
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
+from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import Objective
 from bcut.result import Status
 from bcut.separation.driver import FamilyStatistics, Separation
@@ -136,6 +137,12 @@ class Search:
         return Separation(separators, Problem(part.formulation), statistics=self.statistics)
 
 
+def place(search: Search) -> None:
+    """Offer the placing triangulation: it costs next to nothing, and whatever comes, there is one to hand out."""
+    whole = search.whole.formulation
+    search.offer(whole.columns_of(placing_triangulation(whole.configuration, whole.chirotope)))
+
+
 def bound_at_root(
     search: Search, part: Part, separation: Separation | None, *, target: Fraction | None = None
 ) -> RootBound:
@@ -170,7 +177,8 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     root : RootBound or None
         Of this part. Without it the separators start anew.
     cutoff : float, optional
-        Only triangulations strictly better than this are wanted.
+        Only triangulations strictly better than this are wanted. Without it the part is the whole, and the search starts
+        from the best triangulation so far.
     """
     from bcut.scip.host import TreeOptions, branch_and_cut
 
@@ -180,6 +188,12 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
         separation, cuts = root.separation, root.cuts
         part = part.restricted_to(root.columns)
     options = TreeOptions(seconds=search.seconds_left, seed=search.seed, cutoff=cutoff)
+
+    def on_progress(facts: dict[str, Any]) -> None:
+        # With a cutoff, SCIP's bounds are those of a part only.
+        seen = {} if cutoff is not None else {k: facts[k] for k in ("value", "bound") if facts[k] is not None}
+        search.report("tree", columns=len(part.columns), nodes=facts["nodes"], **seen)
+
     with search.timed("tree"):
         tree = branch_and_cut(
             part.formulation,
@@ -187,7 +201,8 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
             separation,
             options=options,
             cuts=cuts,
-            on_progress=lambda facts: search.report("tree", columns=len(part.columns), nodes=facts["nodes"]),
+            start=search.columns if cutoff is None else None,
+            on_progress=on_progress,
         )
     search.nodes += tree.nodes
     search.rounds.extend(("tree", finished) for finished in tree.rounds)
@@ -198,5 +213,5 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     if tree.bound is not None and cutoff is None:
         # Within SCIP's tolerance: a bound of 22.0000001 must not be rounded up to 23.
         bound = Fraction(search.sign * tree.bound)
-        search.raise_bound(bound - Fraction(max(1, abs(bound)), 10**6))
+        search.raise_bound(bound - max(Fraction(1), abs(bound)) * Fraction(1, 10**6))
     return tree.status

@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import ceil
 from typing import Literal
 
-from bcut.solving.search import Part, Search, bound_at_root, branch
+from bcut.solving.search import Part, Search, bound_at_root, branch, place
 
 # A value within this relative distance of the bound counts as optimal where values are not integral.
 RELATIVE_GAP = 1e-9
@@ -86,11 +86,13 @@ def solve_at_once(search: Search) -> None:
         return
     if search.seconds_left == 0.0:
         return
+    place(search)
     _finish(search, branch(search, search.whole, root))
 
 
 def solve_in_scip(search: Search) -> None:
     """Leave everything to SCIP and the separators inside it: no root loop of ours, no fixing."""
+    place(search)
     _finish(search, branch(search, search.whole, None))
 
 

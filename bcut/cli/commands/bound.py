@@ -6,7 +6,13 @@ from typing import Any
 
 import click
 
-from bcut.cli.options import instance_argument, objective_options, report_options, run_options, separator_options
+from bcut.cli.options import (
+    instance_argument,
+    objective_options,
+    report_options,
+    run_options,
+    separator_options,
+)
 from bcut.cli.running import carry_out
 
 

@@ -9,7 +9,9 @@ import click
 
 @click.command(short_help="Write the points of a family's member, or of a file, in another format.")
 @click.argument("instance", required=False)
-@click.option("--list", "list_families", is_flag=True, help="Show the families of instances and their parameters.")
+@click.option(
+    "--list", "list_families", is_flag=True, help="Show the families of instances and their parameters."
+)
 @click.option(
     "--output",
     type=click.Path(path_type=Path),

@@ -19,9 +19,13 @@ import click
     help="How far the tetrahedra are moved apart, in units of their distance from the middle; 0 leaves them in place.",
 )
 @click.option("--labels", is_flag=True, help="Number the points.")
-@click.option("--normalize", is_flag=True, help="Undo skewed coordinates: regular polygons and solids look regular.")
+@click.option(
+    "--normalize", is_flag=True, help="Undo skewed coordinates: regular polygons and solids look regular."
+)
 @click.option("--title", metavar="TEXT", help="What to write above the picture.")
-def plot(result: Path, picture: Path, explode: float, labels: bool, normalize: bool, title: str | None) -> int:
+def plot(
+    result: Path, picture: Path, explode: float, labels: bool, normalize: bool, title: str | None
+) -> int:
     """Draw the triangulation of the file RESULT: polygons in 2D, tetrahedra moved apart in 3D.
 
     Needs matplotlib: pip install "bcut[plot]".

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +35,7 @@ def list_command(as_json: bool) -> int:
     entries = [
         {
             "name": name,
-            "description": _first_line(family),
+            "description": _description(family),
             "parameters": parameters_of(family),
             "origin": "built-in" if name in built_in else f"{family.__module__}:{family.__qualname__}",
         }
@@ -47,7 +48,9 @@ def list_command(as_json: bool) -> int:
     return 0
 
 
-@separators.command("check", short_help="Check a cut family against all triangulations of small configurations.")
+@separators.command(
+    "check", short_help="Check a cut family against all triangulations of small configurations."
+)
 @click.argument("separator", metavar="NAME|FILE")
 @click.option("--quiet", is_flag=True, help="Print nothing where the separator passes.")
 def check_command(separator: str, quiet: bool) -> int:
@@ -78,13 +81,14 @@ def new_command(name: str) -> int:
     return 0
 
 
-def _first_line(family: type[Separator]) -> str:
-    text = inspect.getdoc(family) or ""
-    return text.partition("\n")[0]
+def _description(family: type[Separator]) -> str:
+    """Return the first paragraph of the docstring as one line."""
+    return " ".join((inspect.getdoc(family) or "").partition("\n\n")[0].split())
 
 
 def _described(entry: dict[str, Any]) -> str:
-    lines = [entry["name"], f"    {entry['description']}"]
+    described = textwrap.wrap(entry["description"], 96)
+    lines = [entry["name"], *(f"    {line}" for line in described)]
     if entry["origin"] != "built-in":
         lines.append(f"    from {entry['origin']}")
     if entry["parameters"]:

@@ -1,0 +1,208 @@
+"""The bound of the averaged relaxation, exactly, and the orbits that no solution within a target can use.
+
+For multipliers y of the cocircuit rows and z of the coverage row, every triangulation satisfies
+
+    sign * objective  >=  z * volume + sum over orbits o of |o| * min(0, r_o),   r_o = sign * c_o - z * volume_o - y M_o,
+
+since 0 <= X_o <= |o|. Floating-point duals are rounded to fractions over one denominator, and everything is computed again
+from these integers. Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long; so z is
+lowered until no r_o is negative, where that is possible (all volumes are positive) and gains something.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.bounds.linear_program import LinearProgram, LpSolution, solve_linear_program
+from bcut.formulations.orbit_cocircuits import OrbitFormulation
+from bcut.objectives.objective import Objective
+
+# Multipliers are multiples of 2**-SHIFT, or of less where 64 bits do not suffice otherwise.
+SHIFT = 45
+# Larger volumes are compared with the hull's volume, in integers of any size.
+_LARGE = 1 << 40
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitBound:
+    """A bound on ``sign * objective``, proven in integer arithmetic.
+
+    Attributes
+    ----------
+    value : Fraction
+        No triangulation has ``sign * objective`` below it.
+    multipliers : ndarray of int64 or of Python integers, shape (rows,)
+        Of the cocircuit rows, over `denominator`.
+    coverage : int
+        Multiplier of the volume row, over `denominator`.
+    reduced_costs : ndarray of int64 or of Python integers, shape (m,)
+        r_o over `denominator`, rounded down where costs had to be.
+    denominator : int
+    """
+
+    value: Fraction
+    multipliers: NDArray[Any]
+    coverage: int
+    reduced_costs: NDArray[Any]
+    denominator: int
+
+    def orbits_within(self, target: Fraction) -> NDArray[np.intp]:
+        """List the orbits that a triangulation with ``sign * objective <= target`` may use (reduced-cost fixing)."""
+        slack = (target - self.value) * self.denominator
+        return np.flatnonzero(self.reduced_costs <= int(slack.__floor__()))
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitRoot:
+    """What the averaged relaxation gave.
+
+    Attributes
+    ----------
+    status : {"optimal", "infeasible", "limit"}
+        "infeasible" when no point satisfies all rows: then there is no triangulation of the wanted kind.
+    lp : float or None
+        Value of the relaxation in the sense of the objective, unrounded.
+    point : ndarray of float or None
+        X, the sums of x over the orbits.
+    bound : OrbitBound or None
+        Proven by the duals.
+    """
+
+    status: Literal["optimal", "infeasible", "limit"]
+    lp: float | None = None
+    point: NDArray[np.float64] | None = None
+    bound: OrbitBound | None = None
+
+
+def orbit_root(
+    formulation: OrbitFormulation,
+    objective: Objective,
+    *,
+    method: Literal["simplex", "interior"] = "simplex",
+    seconds: float | None = None,
+) -> OrbitRoot:
+    """Solve the averaged relaxation, whose optimum is that of the relaxation itself.
+
+    Parameters
+    ----------
+    formulation : OrbitFormulation
+    objective : Objective
+        Of the representatives ``formulation.simplices``; invariant under the group.
+    method : {"simplex", "interior"}
+        "interior" gives duals that fix the most orbits.
+    seconds : float, optional
+        Time limit of the linear program.
+    """
+    if not len(formulation.simplices):
+        return OrbitRoot("infeasible")
+    program = _program(formulation, objective)
+    solution = solve_linear_program(program, method=method, seconds=seconds)
+    if solution.status != "optimal":
+        return OrbitRoot(solution.status)
+    return OrbitRoot(
+        "optimal",
+        objective.sign * solution.value,
+        solution.x,
+        safe_orbit_bound(formulation, objective, solution.duals[1:], float(solution.duals[0])),
+    )
+
+
+def _program(formulation: OrbitFormulation, objective: Objective) -> LinearProgram:
+    """Return the program with the coverage row first, divided by the hull's volume.
+
+    X <= |o| is left out: the other rows imply it, as each simplex contains a generic point, and each generic point is
+    covered once.
+    """
+    import scipy.sparse as sp
+
+    shares = np.true_divide(formulation.volumes, formulation.volume).astype(float)
+    # Rows with entries around 1 suit the solver best.
+    scale = float(np.abs(shares).max())
+    matrix = sp.vstack((sp.csr_matrix(shares / scale), formulation.matrix.astype(float)), format="csr")
+    right = np.zeros(matrix.shape[0])
+    right[0] = 1 / scale
+    return LinearProgram(objective.sign * objective.costs, matrix, right)
+
+
+def safe_orbit_bound(
+    formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
+) -> OrbitBound:
+    """Turn floating-point multipliers into an exact bound.
+
+    Parameters
+    ----------
+    formulation : OrbitFormulation
+    objective : Objective
+    duals : ndarray of float, shape (rows,)
+        Any numbers; good ones give good bounds. For the minimisation of ``sign * objective``.
+    coverage : float
+        Multiplier of the coverage row, if that row were divided by the largest of its entries' sizes.
+    """
+    volumes, volume = formulation.volumes, formulation.volume
+    largest = max(map(abs, volumes.tolist()))
+    small = volumes.dtype == np.int64 and abs(volume) < _LARGE and largest < _LARGE
+    shift = _shift(formulation, objective, duals, coverage)
+    denominator = (1 << shift) * (1 if small else abs(volume))
+    unit = denominator >> shift
+    multipliers = np.rint(np.nan_to_num(duals) * 2.0**shift).astype(np.int64)
+    share = Fraction(float(np.nan_to_num(coverage))) * denominator / largest
+    cover = round(share)
+    if small and objective.fits_64_bits:
+        reduced = _costs(objective, denominator) - formulation.matrix.T.astype(np.int64) @ multipliers
+    else:
+        products = formulation.matrix.T.astype(np.int64) @ multipliers
+        multipliers = multipliers.astype(object) * unit
+        reduced = _costs(objective, denominator).astype(object) - products.astype(object) * unit
+    bounds = [_with_coverage(formulation, reduced, cover)]
+    lowered = _lowered(volumes, bounds[0][1])
+    if lowered:
+        bounds.append(_with_coverage(formulation, reduced, cover - lowered))
+    total, left, chosen = max(bounds, key=lambda bound: bound[0])
+    return OrbitBound(Fraction(total, denominator), multipliers, chosen, left, denominator)
+
+
+def _with_coverage(formulation: OrbitFormulation, reduced: NDArray[Any], cover: int) -> tuple[int, NDArray[Any], int]:
+    """Return the bound and the reduced costs with a multiplier of the volume row, over the denominator."""
+    left = reduced - formulation.volumes * cover
+    negative = np.flatnonzero(left < 0)
+    loss = sum(
+        size * cost
+        for size, cost in zip(formulation.sizes[negative].tolist(), left[negative].tolist(), strict=True)
+    )
+    return cover * formulation.volume + loss, left, cover
+
+
+def _lowered(volumes: NDArray[Any], reduced: NDArray[Any]) -> int:
+    """Return by how much less a multiplier of the volume row leaves no reduced cost negative; 0 where none does."""
+    negative = np.flatnonzero(reduced < 0)
+    pairs = list(zip(reduced[negative].tolist(), volumes[negative].tolist(), strict=True))
+    # Of irrational volumes this is one coefficient, of any sign.
+    if not pairs or min(volumes.tolist()) <= 0:
+        return 0
+    return max(-(cost // volume) for cost, volume in pairs)
+
+
+def _costs(objective: Objective, denominator: int) -> NDArray[Any]:
+    """Return ``floor(sign * cost * denominator)``."""
+    scale = objective.sign * denominator
+    values = [int(value) * scale // objective.denominator for value in objective.numerators.tolist()]
+    fits = max(map(abs, values), default=0) < 2**62
+    return np.array(values, dtype=np.int64 if fits else object)
+
+
+def _shift(
+    formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
+) -> int:
+    """Return the largest shift up to `SHIFT` for which a reduced cost stays below 2**61."""
+    entries = float(abs(formulation.matrix).astype(np.int64).sum(axis=0).max()) if formulation.matrix.nnz else 0.0
+    size = float(np.abs(objective.costs).max(initial=1.0)) + 2 * abs(float(np.nan_to_num(coverage)))
+    size += entries * float(np.abs(np.nan_to_num(duals)).max(initial=0.0))
+    shift = SHIFT
+    while shift > 0 and size * 2.0**shift >= 2.0**61:
+        shift -= 1
+    return shift

@@ -1,0 +1,300 @@
+"""The contract that every separator keeps, as a suite of checks; its heart is validity.
+
+A separator is set up on small configurations, shown points of their relaxations and others, and every cut
+that it yields is compared with *every* triangulation, in integer arithmetic. Points are vertices of the
+relaxation, before and after the separator's own cuts, the same with noise, mixtures of triangulations, and
+points far outside: a valid cut is valid wherever it was found.
+"""
+
+from __future__ import annotations
+
+import inspect
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from bcut.errors import SeparatorError
+from bcut.separation.cases import CASES, Case, CaseName, Point, case, disturbed
+from bcut.separation.driver import MIN_EFFICACY, IntegerCut, to_integers
+from bcut.separation.seam import Cut, FractionalPoint, Separator
+
+# Rounds of a separator's own cuts on each objective.
+_ROUNDS = 3
+# A separator that is this much at fault is not asked any further.
+_ENOUGH_FAILURES = 5
+
+RULES = {
+    "name": "it has a name",
+    "parameters": "every parameter has a default",
+    "runs": "it never raises",
+    "cuts": "it yields cuts: distinct columns, exact numbers",
+    "read-only": "it leaves the point as it is",
+    "deterministic": "the same points give the same cuts",
+    "valid": "no cut cuts off a triangulation",
+}
+
+
+@dataclass(frozen=True)
+class InvalidCut:
+    """A cut that a triangulation violates.
+
+    Attributes
+    ----------
+    instance : str
+    cut : str
+        The inequality, written out with vertices.
+    triangulation : list of list of int
+        Its simplices.
+    left, rhs : int
+        Left-hand side of the cut for the triangulation, and its right-hand side.
+    """
+
+    instance: str
+    cut: str
+    triangulation: list[list[int]]
+    left: int
+    rhs: int
+
+    def __str__(self) -> str:
+        simplices = " ".join(str(simplex) for simplex in self.triangulation)
+        return (
+            f"{self.instance}: the cut {self.cut} cuts off a triangulation, "
+            f"for which the left side is {self.left}: {simplices}"
+        )
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One broken rule: its key in `RULES`, and what happened."""
+
+    rule: str
+    text: str
+    invalid: InvalidCut | None = None
+
+
+@dataclass
+class CheckReport:
+    """What the suite found.
+
+    Attributes
+    ----------
+    separator : str
+        The name of the family.
+    failures : list of Failure
+    configurations, triangulations, points : int
+        How many there were.
+    cuts, violated : int
+        Cuts that were compared with all triangulations of their configuration, each once; and how many of
+        them were violated at the point at which they were found.
+    seconds : float
+    """
+
+    separator: str
+    failures: list[Failure] = field(default_factory=list)
+    configurations: int = 0
+    triangulations: int = 0
+    points: int = 0
+    cuts: int = 0
+    violated: int = 0
+    seconds: float = 0.0
+
+    @property
+    def ok(self) -> bool:
+        """Whether every rule was kept."""
+        return not self.failures
+
+    @property
+    def invalid_cuts(self) -> list[InvalidCut]:
+        """The cuts that cut off a triangulation."""
+        return [failure.invalid for failure in self.failures if failure.invalid]
+
+    @property
+    def summary(self) -> str:
+        """The report as lines of text."""
+        broken = {failure.rule for failure in self.failures}
+        lines = [f"separator '{self.separator}': {'passed' if self.ok else 'FAILED'}"]
+        lines += [f"  {'FAILED' if rule in broken else 'ok':6}  {text}" for rule, text in RULES.items()]
+        lines.append(
+            f"  {self.cuts} cuts ({self.violated} violated where they were found) at {self.points} points of "
+            f"{self.configurations} configurations, against {self.triangulations} triangulations, "
+            f"{self.seconds:.1f} s"
+        )
+        if self.ok and not self.violated:
+            lines.append("  No cut was violated anywhere: validity was hardly put to the test.")
+        for failure in self.failures:
+            lines += ["", f"{failure.rule}: {failure.text}"]
+        return "\n".join(lines)
+
+
+def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = CASES) -> CheckReport:
+    """Check that a separator keeps its contract.
+
+    Parameters
+    ----------
+    make : callable
+        Makes a new separator, such as ``MyCuts`` or ``lambda: resolve("./my_cuts.py:depth=3")``.
+    cases : sequence of CaseName, optional
+        On which configurations.
+
+    Returns
+    -------
+    CheckReport
+
+    Raises
+    ------
+    BcutError
+        Whatever `make` raises; what the separator raises later is in the report.
+    """
+    started = time.perf_counter()
+    first = make()
+    report = CheckReport(str(first.name) or type(first).__name__)
+    _check_declaration(first, report)
+    for name in cases:
+        if len(report.failures) >= _ENOUGH_FAILURES:
+            break
+        small = case(name)
+        report.configurations += 1
+        report.triangulations += small.incidence.shape[1]
+        _CaseCheck(small, make, report).run()
+    report.seconds = time.perf_counter() - started
+    return report
+
+
+def _check_declaration(separator: Separator, report: CheckReport) -> None:
+    family = type(separator)
+    if not (isinstance(family.name, str) and family.name):
+        report.failures.append(
+            Failure("name", f'class {family.__name__} has no name; set `name = "my-cuts"` in it')
+        )
+    for parameter in inspect.signature(family).parameters.values():
+        variadic = parameter.kind in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+        if parameter.default is inspect.Parameter.empty and not variadic:
+            text = f"parameter '{parameter.name}' of {family.__name__} has no default; give it one"
+            report.failures.append(Failure("parameters", text))
+
+
+class _BrokenRuleError(Exception):
+    """Ends the check of one case."""
+
+    def __init__(self, rule: str, text: str, invalid: InvalidCut | None = None) -> None:
+        self.failure = Failure(rule, text, invalid)
+
+
+class _CaseCheck:
+    """The checks of one separator on one configuration."""
+
+    def __init__(self, small: Case, make: Callable[[], Separator], report: CheckReport) -> None:
+        self.case, self.report = small, report
+        self.separator, self.second = make(), make()
+        self.known: set[tuple[bytes, bytes, int]] = set()
+
+    def run(self) -> None:
+        try:
+            for separator in (self.separator, self.second):
+                self._call("setup()", partial(separator.setup, self.case.problem))
+            for x in self._points():
+                self._look(x)
+        except _BrokenRuleError as broken:
+            self.report.failures.append(broken.failure)
+
+    def _points(self) -> Iterator[Point]:
+        """Yield points; those of the rounds with the separator's own cuts are looked at on the way."""
+        random = np.random.default_rng(2)
+        yield from self.case.other_points()
+        for costs in self.case.objectives():
+            cuts: list[IntegerCut] = []
+            for _ in range(_ROUNDS):
+                x = self.case.optimal_vertex(costs, cuts)
+                if x is None:
+                    # No valid cuts leave nothing; and the invalid one among them has been reported by now.
+                    break
+                new = [cut for cut in self._look(x) if cut.efficacy(x) > MIN_EFFICACY]
+                if not cuts:
+                    yield from disturbed(x, random)
+                if not new:
+                    break
+                cuts += new
+
+    def _look(self, x: Point) -> list[IntegerCut]:
+        """Show a point to the separator, check what it yields and return it."""
+        self.report.points += 1
+        cuts = self._cuts(self.separator, x)
+        for cut in cuts:
+            self._compare(cut, x)
+        if [cut.key for cut in self._cuts(self.second, x)] != [cut.key for cut in cuts]:
+            text = f"{self.case.name}: two new separators, shown the same points, yielded different cuts"
+            raise _BrokenRuleError("deterministic", text)
+        return cuts
+
+    def _cuts(self, separator: Separator, x: Point) -> list[IntegerCut]:
+        point = FractionalPoint(self.case.problem, x)
+        before = _contents(point)
+        yielded = self._call("separate()", lambda: list(separator.separate(point)))
+        for name, content in _contents(point).items():
+            if content != before[name]:
+                raise _BrokenRuleError(
+                    "read-only", f"{self.case.name}: separate() changed the point's {name}; work on a copy"
+                )
+        scaled = []
+        for cut in yielded:
+            if not isinstance(cut, Cut):
+                text = f"{self.case.name}: separate() yielded {type(cut).__name__} {cut!r}, no Cut"
+                raise _BrokenRuleError("cuts", text)
+            try:
+                scaled.append(to_integers(cut, separator.name, len(x)))
+            except (SeparatorError, OverflowError) as error:
+                raise _BrokenRuleError("cuts", f"{self.case.name}: {error}") from None
+        return scaled
+
+    def _call(self, what: str, action: Callable[[], Any]) -> Any:
+        try:
+            return action()
+        except Exception as error:
+            text = (
+                f"{self.case.name}: {what} raised {type(error).__name__}: {error}\n{traceback.format_exc()}"
+            )
+            raise _BrokenRuleError("runs", text.rstrip()) from None
+
+    def _compare(self, cut: IntegerCut, x: Point) -> None:
+        if cut.key in self.known:
+            return
+        self.known.add(cut.key)
+        self.report.cuts += 1
+        self.report.violated += bool(cut.efficacy(x) > MIN_EFFICACY)
+        left_sides = self.case.left_sides(cut)
+        worst = int(np.argmax(left_sides))
+        if left_sides[worst] > cut.rhs:
+            invalid = InvalidCut(
+                str(self.case.name),
+                _written(cut, self.case),
+                self.case.triangulation(worst),
+                int(left_sides[worst]),
+                cut.rhs,
+            )
+            raise _BrokenRuleError("valid", str(invalid), invalid)
+
+
+def _contents(point: FractionalPoint) -> dict[str, bytes]:
+    """Return all that a separator is shown, frozen."""
+    shown = {
+        "x": point.x,
+        "support": point.support,
+        "fractional": point.fractional,
+        "crossings": point.crossings,
+    }
+    return {name: values.tobytes() for name, values in shown.items()}
+
+
+def _written(cut: IntegerCut, small: Case) -> str:
+    """Write an inequality out with vertices: ``x[0 1 4] + 2 x[1 3 4] <= 2``."""
+    text = ""
+    for column, coefficient in zip(cut.columns.tolist(), cut.coefficients.tolist(), strict=True):
+        sign = ("- " if coefficient < 0 else "") if not text else (" - " if coefficient < 0 else " + ")
+        factor = "" if abs(coefficient) == 1 else f"{abs(coefficient)} "
+        text += f"{sign}{factor}x[{' '.join(map(str, small.problem.simplices[column].tolist()))}]"
+    return f"{text} <= {cut.rhs}"
