@@ -19,6 +19,7 @@ from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.geometry.stars import Star
 from bcut.instance import load_instance
 from bcut.objectives.objective import make_objective
+from bcut.separation.driver import to_integers
 from bcut.separation.seam import FractionalPoint, Problem
 from bcut.separators.link import Link, most_violated_weights
 
@@ -80,19 +81,20 @@ def main() -> None:
         started = time.perf_counter()
         cuts = list(separator.separate(point))
         seconds = time.perf_counter() - started
-        stars = [separator.stars.star(face) for face in separator.faces_to_try(point.x)]
+        wedges = np.isin(separator.stars.columns, point.fractional)
+        stars = [separator.stars.star(face) for face in np.unique(separator.stars.face_of[wedges]).tolist()]
         started = time.perf_counter()
         expected = [reference(star, point.x[star.columns]) for star in stars]
         reference_seconds = time.perf_counter() - started
         found = [most_violated_weights(star, point.x[star.columns], separator.programs)[0] for star in stars]
         assert np.allclose(found, expected, atol=1e-5)
+        tried = {tuple(separator.stars.faces[face]) for face in separator.faces_to_try(point.x)}
+        assert all(tuple(star.face) in tried for star, short in zip(stars, found, strict=True) if short > 1e-5)
         print(
             f"{number} | {lp_seconds:.2f} | {seconds:.3f} | {len(stars)} | {reference_seconds:.3f} "
             f"| {reference_seconds / seconds:.1f}",
             flush=True,
         )
-        from bcut.separation.driver import to_integers
-
         relaxation.add([to_integers(cut, "link", len(point.x)) for cut in cuts])
 
 

@@ -15,8 +15,8 @@ _UNIT = 1 << 30
 # A clique counts as violated from this much above 1 on.
 _MARGIN = _UNIT // 10_000
 
-# What is spent on making a violated clique heavier, in coloured nodes.
-_POLISH = 500
+# What is spent on making a violated clique heavier, in members of colour classes.
+_POLISH = 2000
 
 # Candidates for lifting that are tried, per simplex that is added.
 _POOL = 4
@@ -40,7 +40,7 @@ class Clique(Separator):
     max_nodes : int
         Only that many fractional simplices, those of largest value, are looked at.
     effort : int
-        Simplices that all colourings of the search together may colour, about; every search gets its share.
+        How long to search: the members of all colour classes together, about.
     lift : int
         At most this many simplices of value zero are added to each clique.
     """
@@ -48,7 +48,7 @@ class Clique(Separator):
     name: ClassVar[str] = "clique"
 
     def __init__(
-        self, *, max_cuts: int = 50, max_nodes: int = 500, effort: int = 100_000, lift: int = 150
+        self, *, max_cuts: int = 50, max_nodes: int = 300, effort: int = 300_000, lift: int = 150
     ) -> None:
         if min(max_cuts, max_nodes, effort) < 1 or lift < 0:
             raise ValueError("max_cuts, max_nodes and effort are at least 1, lift at least 0")
@@ -62,7 +62,7 @@ class Clique(Separator):
         cliques.sort(key=lambda clique: (-values[clique].sum(), clique))
         for clique in cliques[: self.max_cuts]:
             members = self.extended(columns[clique], point)
-            yield Cut(members, 1, proof={"clique": members.tolist()})
+            yield Cut(members, 1, proof={"clique": self.problem.simplices[members].tolist()})
 
     def extended(self, clique: NDArray[np.integer], point: FractionalPoint) -> NDArray[np.int64]:
         """Add simplices that cross all members and each other, as many as are found in one pass."""
@@ -91,7 +91,7 @@ def heavy_cliques(crossings: NDArray[np.bool_], values: NDArray[np.floating], ef
     values : ndarray of float, shape (k,)
         Weights of the nodes, at least 0.
     effort : int
-        Nodes that all colourings together may colour, about.
+        Members of all colour classes together, about; what one search leaves over, the next ones get.
 
     Returns
     -------
@@ -103,16 +103,19 @@ def heavy_cliques(crossings: NDArray[np.bool_], values: NDArray[np.floating], ef
     search = _Search(crossings, values)
     cliques: dict[tuple[int, ...], None] = {}
     covered = 0
-    # Nodes with little around them first: those that are in no heavy clique are done with, and leave the
-    # graph.
-    for node in np.argsort(crossings @ values, kind="stable").tolist():
+    # Nodes with little around them first: those in no heavy clique are done with, and leave the graph.
+    for done, node in enumerate(np.argsort(crossings @ values, kind="stable").tolist()):
+        if not effort:
+            break
         if covered >> node & 1:
             continue
-        clique = search.heaviest_through(node, effort // len(values) + len(values))
+        share = effort // (len(values) - done)
+        clique = search.heaviest_through(node, share)
+        effort -= min(effort, search.spent)
         if clique:
             covered |= clique
             cliques.setdefault(tuple(sorted(order[list(_bits(clique))].tolist())))
-        elif search.effort > 0:
+        elif search.spent <= share:
             search.remaining &= ~(1 << node)
     return [list(clique) for clique in cliques]
 
@@ -125,26 +128,32 @@ class _Search:
         self.adjacent = [int.from_bytes(row.tobytes(), "little") for row in packed]
         self.weight = np.rint(values * _UNIT).astype(np.int64).tolist()
         self.remaining = (1 << len(values)) - 1
-        self.effort = 0
+        self.spent = self.share = 0
+        self.dived = False
         self.best = self.best_weight = 0
 
-    def heaviest_through(self, node: int, effort: int) -> int:
-        """Return the heaviest clique through a node as a mask, 0 if none is found that weighs more than 1."""
-        self.effort = effort
+    def heaviest_through(self, node: int, share: int) -> int:
+        """Return the heaviest clique through a node as a mask, 0 if none is found that weighs more than 1.
+
+        The search ends when it has used its share up, but not before it got to the bottom once.
+        """
+        self.spent, self.share, self.dived = 0, share, False
         self.best, self.best_weight = 0, _UNIT + _MARGIN
         self._grow(1 << node, self.weight[node], self.adjacent[node] & self.remaining)
         return self.best
 
     def _grow(self, clique: int, weight: int, candidates: int) -> None:
-        self.effort -= 1 + candidates.bit_count()
         if not candidates:
+            self.dived = True
             if weight > self.best_weight:
                 self.best, self.best_weight = clique, weight
                 # What counts is that it is violated: little is spent on making it more so.
-                self.effort = min(self.effort, _POLISH)
+                self.share = min(self.share, self.spent + _POLISH)
             return
-        for node, bound in self._coloured(candidates, self.best_weight - weight):
-            if weight + bound <= self.best_weight or self.effort <= 0:
+        listed = self._coloured(candidates, self.best_weight - weight)
+        self.dived |= not listed
+        for node, bound in listed:
+            if weight + bound <= self.best_weight or (self.dived and self.spent > self.share):
                 return
             self._grow(clique | 1 << node, weight + self.weight[node], candidates & self.adjacent[node])
             candidates &= ~(1 << node)
@@ -168,6 +177,7 @@ class _Search:
                 share = min(share, residual[node])
                 open_nodes &= ~self.adjacent[node] & ~(1 << node)
             total += share
+            self.spent += len(stable)
             for node in stable:
                 residual[node] -= share
                 if not residual[node]:

@@ -92,11 +92,24 @@ class Link(Separator):
             yield cut
 
     def faces_to_try(self, x: NDArray[np.floating]) -> list[int]:
-        """List the faces whose star carries a fractional value."""
-        values = x[self.stars.columns]
-        fractional = (values > _SHORTFALL) & (values < 1 - _SHORTFALL)
-        has = np.add.reduceat(fractional, self.stars.starts[:-1]) if len(values) else np.zeros(0, dtype=int)
-        return np.flatnonzero(has).tolist()
+        """List the faces whose star is not packed perfectly at first sight.
+
+        A star is where all of it passes through one node: every closed walk goes through that node once a turn, and falls
+        apart there into walks that wind once. The node with the largest flow is the only one to look at, and the wedges
+        that pass its direction elsewhere are told by two orientations each.
+        """
+        stars = self.stars
+        wedges = np.flatnonzero(x[stars.columns] > _NOISE)
+        values, faces = x[stars.columns[wedges]], stars.face_of[wedges]
+        tails, heads = stars.tails[wedges], stars.heads[wedges]
+        count, n = len(stars.faces), self.problem.chirotope.n
+        flow = np.bincount(faces * n + tails, weights=values, minlength=count * n).reshape(count, n)
+        busiest = flow.argmax(axis=1)[faces]
+        beyond_tail = stars.turns(stars.faces[faces], tails, busiest) > 0
+        before_head = stars.turns(stars.faces[faces], busiest, heads) >= 0
+        elsewhere = beyond_tail & before_head & (heads != busiest)
+        passing = np.bincount(faces, weights=values * elsewhere, minlength=count)
+        return np.flatnonzero(passing > _SHORTFALL).tolist()
 
     def _cut(self, star: Star, values: NDArray[np.floating], weights: NDArray[np.floating]) -> Cut | None:
         """Make the exact cut: round, lift, and write alpha * y_e - w x <= 0 with few nonzero coefficients."""
@@ -137,10 +150,6 @@ def most_violated_weights(
     weights = np.zeros(len(values))
     support = np.flatnonzero(values > _NOISE)
     tails, heads, x = star.tails[support], star.heads[support], values[support]
-    through = np.bincount(tails, weights=x, minlength=star.size)
-    total = float(x[star.wraps[support]].sum())
-    if through.max() >= total - _SHORTFALL:
-        return 0.0, weights
     level = _direction_with_fewest_tails(star, support)
     over = star.over[level, support]
     total = float(x[over].sum())

@@ -75,11 +75,12 @@ class OddCycle(Separator):
         for nodes in ranked[: self.max_cuts]:
             members = columns[list(nodes)]
             lifted, coefficients = self.lifted(members, point)
+            simplices = self.problem.simplices
             yield Cut(
                 np.concatenate((members, lifted)),
                 (len(members) - 1) // 2,
                 [1] * len(members) + coefficients,
-                proof={"cycle": members.tolist(), "lifted": lifted.tolist()},
+                proof={"cycle": simplices[members].tolist(), "lifted": simplices[lifted].tolist()},
             )
 
     def lifted(

@@ -10,6 +10,16 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
+from bcut.separators.clique import Clique, heavy_cliques
+from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
+from bcut.separators.odd_cycle import (
+    OddCycle,
+    chordless_cycle,
+    heaviest_stable,
+    hole_gains,
+    odd_closed_walks,
+    sequential_lifting,
+)
 from numpy.typing import NDArray
 
 from bcut.bounds.root import RootBound, root_bound
@@ -22,16 +32,6 @@ from bcut.objectives.objective import Objective, make_objective
 from bcut.separation.driver import Separation, to_integers
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import FractionalPoint, Problem, Separator
-from bcut.separators.clique import Clique, heavy_cliques
-from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
-from bcut.separators.odd_cycle import (
-    OddCycle,
-    chordless_cycle,
-    heaviest_stable,
-    hole_gains,
-    odd_closed_walks,
-    sequential_lifting,
-)
 
 
 def problem(instance: str, *, spanning: bool = False) -> Problem:
@@ -420,8 +420,15 @@ def test_points_in_convex_position_need_no_branching() -> None:
 
 @pytest.mark.parametrize(
     ("instance", "spanning"),
-    [("random:12,2,seed=1", True), ("random:9,2,seed=2", False), ("grid:4,4", True), ("grid:3,3", False)]
-    + [("polygon:9", False), ("polygon:5,center", False), ("random:25,2,seed=3", True)],  # noqa: RUF005
+    [
+        ("random:12,2,seed=1", True),
+        ("random:9,2,seed=2", False),
+        ("grid:4,4", True),
+        ("grid:3,3", False),
+        ("polygon:9", False),
+        ("polygon:5,center", False),
+        ("random:25,2,seed=3", True),
+    ],
 )
 def test_polygon_cuts_never_fire_in_formulation_2(instance: str, spanning: bool) -> None:
     """Conjecture 1 of the paper, at vertices of the relaxation and at mixtures of them."""
@@ -500,8 +507,10 @@ def test_every_cut_is_violated_and_says_why(name: str) -> None:
         "clique:effort=0",
         "odd-cycle:max_cuts=0",
         "odd-cycle:backend=scip",
-    ]
-    + ["odd-cycle:max_nodes=0", "convex-polygon:effort=0", "convex-polygon:depth=3"],
+        "odd-cycle:max_nodes=0",
+        "convex-polygon:effort=0",
+        "convex-polygon:depth=3",
+    ],
 )
 def test_bad_parameters_are_refused(text: str) -> None:
     with pytest.raises(SeparatorLoadError, match=text.split(":")[0]):

@@ -52,7 +52,10 @@ class LpSolution:
 
 
 def solve_linear_program(
-    program: LinearProgram, *, method: Literal["simplex", "interior"] = "simplex", seconds: float | None = None
+    program: LinearProgram,
+    *,
+    method: Literal["simplex", "interior"] = "simplex",
+    seconds: float | None = None,
 ) -> LpSolution:
     """Solve a linear program.
 
@@ -105,7 +108,10 @@ def solve_linear_program(
     value = float(program.costs @ x) if len(x) == columns else np.nan
     status = solver.getModelStatus()
     # Without crossover, HiGHS calls a point that is optimal but not basic "unknown" at times; any duals give a bound.
-    if status in (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kUnknown) and len(duals) == rows:
+    if (
+        status in (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kUnknown)
+        and len(duals) == rows
+    ):
         return LpSolution("optimal", x, duals, value)
     if status == highspy.HighsModelStatus.kInfeasible:
         return LpSolution("infeasible", x, duals, value)

@@ -2,11 +2,12 @@
 
 For multipliers y of the cocircuit rows and z of the coverage row, every triangulation satisfies
 
-    sign * objective  >=  z * volume + sum over orbits o of |o| * min(0, r_o),   r_o = sign * c_o - z * volume_o - y M_o,
+    sign * objective  >=  z * volume + sum over orbits o of |o| * min(0, r_o),
+    r_o = sign * c_o - z * volume_o - y M_o,
 
-since 0 <= X_o <= |o|. Floating-point duals are rounded to fractions over one denominator, and everything is computed again
-from these integers. Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long; so z is
-lowered until no r_o is negative, where that is possible (all volumes are positive) and gains something.
+since 0 <= X_o <= |o|. Floating-point duals are rounded to fractions over one denominator, and everything is computed
+again from these integers. Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long;
+so z is lowered until no r_o is negative, where that is possible (all volumes are positive) and gains something.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.linear_program import LinearProgram, LpSolution, solve_linear_program
+from bcut.bounds.linear_program import LinearProgram, solve_linear_program
 from bcut.formulations.orbit_cocircuits import OrbitFormulation
 from bcut.objectives.objective import Objective
 
@@ -166,7 +167,9 @@ def safe_orbit_bound(
     return OrbitBound(Fraction(total, denominator), multipliers, chosen, left, denominator)
 
 
-def _with_coverage(formulation: OrbitFormulation, reduced: NDArray[Any], cover: int) -> tuple[int, NDArray[Any], int]:
+def _with_coverage(
+    formulation: OrbitFormulation, reduced: NDArray[Any], cover: int
+) -> tuple[int, NDArray[Any], int]:
     """Return the bound and the reduced costs with a multiplier of the volume row, over the denominator."""
     left = reduced - formulation.volumes * cover
     negative = np.flatnonzero(left < 0)
@@ -199,7 +202,9 @@ def _shift(
     formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
 ) -> int:
     """Return the largest shift up to `SHIFT` for which a reduced cost stays below 2**61."""
-    entries = float(abs(formulation.matrix).astype(np.int64).sum(axis=0).max()) if formulation.matrix.nnz else 0.0
+    entries = (
+        float(abs(formulation.matrix).astype(np.int64).sum(axis=0).max()) if formulation.matrix.nnz else 0.0
+    )
     size = float(np.abs(objective.costs).max(initial=1.0)) + 2 * abs(float(np.nan_to_num(coverage)))
     size += entries * float(np.abs(np.nan_to_num(duals)).max(initial=0.0))
     shift = SHIFT

@@ -1,13 +1,13 @@
 """Formulation 2 restricted to the triangulations that a subgroup of the symmetries maps to themselves.
 
-The simplices of an orbit under the subgroup are chosen together, so one variable stands for all of them; rows that are
-images of each other become equal. What is found is a triangulation of the configuration, but nothing is proven about the
-others: a tool for finding good ones.
+The simplices of an orbit under the subgroup are chosen together, so one variable stands for all of them; rows that
+are images of each other become equal. What is found is a triangulation of the configuration, but nothing is proven
+about the others: a tool for finding good ones.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.permutations import PermutationGroup
 from bcut.geometry.subsets import ranks
-from bcut.objectives.objective import Objective
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -30,31 +29,33 @@ class InvariantProgram:
     ----------
     formulation : Formulation
         Its `simplices` are one of each orbit; each row is one of an orbit of rows.
-    objective : Objective
+    lengths : ndarray of int64, shape (orbits,)
+        How many simplices each variable stands for: its cost is that of one of them times this.
     orbit_of : ndarray of int64, shape (m,)
         The variable of each simplex of the original formulation.
     """
 
     formulation: Formulation
-    objective: Objective
+    lengths: NDArray[np.int64]
     orbit_of: NDArray[np.int64]
+
+    @property
+    def representatives(self) -> NDArray[np.intp]:
+        """A column of the original formulation for each variable."""
+        return np.unique(self.orbit_of, return_index=True)[1]
 
     def expanded(self, columns: NDArray[np.integer]) -> NDArray[np.intp]:
         """Return the columns of the original formulation that a choice of variables stands for."""
         return np.flatnonzero(np.isin(self.orbit_of, columns))
 
 
-def invariant_program(
-    formulation: Formulation, objective: Objective, subgroup: PermutationGroup
-) -> InvariantProgram:
+def invariant_program(formulation: Formulation, subgroup: PermutationGroup) -> InvariantProgram:
     """Identify the variables that a subgroup maps to each other.
 
     Parameters
     ----------
     formulation : Formulation
         Its columns must be closed under the subgroup, such as whole orbits under a larger group.
-    objective : Objective
-        Invariant under the subgroup.
     subgroup : PermutationGroup
         Of affine symmetries of the configuration.
     """
@@ -64,7 +65,9 @@ def invariant_program(
     columns = len(formulation.simplices)
     orbit_of = _orbits(formulation.simplices, subgroup, n)
     count = int(orbit_of.max(initial=-1)) + 1
-    gather = sp.csr_matrix((np.ones(columns, dtype=np.int32), (np.arange(columns), orbit_of)), shape=(columns, count))
+    gather = sp.csr_matrix(
+        (np.ones(columns, dtype=np.int32), (np.arange(columns), orbit_of)), shape=(columns, count)
+    )
     faces = np.array(formulation.row_faces[1:], dtype=np.int64).reshape(-1, formulation.chirotope.dimension)
     row_orbit = _orbits(faces, subgroup, n)
     rows = np.concatenate(([0], 1 + np.unique(row_orbit, return_index=True)[1])).astype(np.int64)
@@ -74,7 +77,6 @@ def invariant_program(
     rows, matrix = _without_empty(rows, matrix)
     lengths = np.bincount(orbit_of, minlength=count)
     representatives = np.unique(orbit_of, return_index=True)[1]
-    numerators = objective.numerators[representatives] * lengths
     return InvariantProgram(
         Formulation(
             name=formulation.name,
@@ -87,13 +89,13 @@ def invariant_program(
             upper=formulation.upper[rows],
             row_faces=tuple(formulation.row_faces[row] for row in rows.tolist()),
         ),
-        replace(objective, numerators=numerators),
+        lengths,
         orbit_of,
     )
 
 
 def _orbits(sets: NDArray[np.int64], group: PermutationGroup, n: int) -> NDArray[np.int64]:
-    """Number the orbits of some sets of points, shape (m, k) to (m,); images outside the list are ignored."""
+    """Give numbers to the orbits of some sets of points, (m, k) to (m,); images outside the list are ignored."""
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
 

@@ -1,21 +1,23 @@
 """Formulation 2 averaged over a group of symmetries: one variable per orbit of d-simplices.
 
-The mean of the images of a feasible point of the linear relaxation under the group is feasible too, has the same value of
-an invariant objective, and is constant on orbits. So the relaxation has an optimum of that kind, and is solved over the
-numbers X_o = sum of x_t over the simplices t of orbit o, with 0 <= X_o <= |o|.
+The mean of the images of a feasible point of the linear relaxation under the group is feasible too, has the same
+value of an invariant objective, and is constant on orbits. So the relaxation has an optimum of that kind, and is
+solved over the numbers X_o = sum of x_t over the simplices t of orbit o, with 0 <= X_o <= |o|.
 
-Rows: the cocircuit row of an interior (d-1)-simplex f and those of its images say the same. Summed over the orbit of f,
+Rows: the cocircuit row of an interior (d-1)-simplex f and those of its images say the same. Summed over the orbit of
+f,
 
     sum over o of X_o * (facets of a simplex of o that a symmetry maps to f so that the simplex comes to the + side,
                          minus those that come to the - side)  =  0,
 
-with coefficients of size d + 1 at most. Where a symmetry maps f to itself and exchanges its sides, the row is 0 = 0 and is
-left out.
+with coefficients of size d + 1 at most. Where a symmetry maps f to itself and exchanges its sides, the row is 0 = 0
+and is left out.
 
-Coverage: the cocircuit rows make the number of chosen simplices over a generic point a constant c, and then the volumes
-of the chosen simplices add up to c times the volume of the hull. With c = 1 that is an equation in the number field of
-the coordinates, and holds coefficient by coefficient: by an equation over the rationals each, since the cocircuit rows
-have rational coefficients. One coefficient in which the hull's volume does not vanish is enough to make c = 1.
+Coverage: the cocircuit rows make the number of chosen simplices over a generic point a constant c, and then the
+volumes of the chosen simplices add up to c times the volume of the hull. With c = 1 that is an equation in the number
+field of the coordinates, and holds coefficient by coefficient: by an equation over the rationals each, since the
+cocircuit rows have rational coefficients. One coefficient in which the hull's volume does not vanish is enough to
+make c = 1.
 """
 
 from __future__ import annotations
@@ -81,7 +83,9 @@ class OrbitFormulation:
         """Numbers of columns and rows, the coverage row included."""
         return len(self.simplices), self.matrix.shape[0] + 1
 
-    def expanded(self, orbits: Sequence[int] | NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def expanded(
+        self, orbits: Sequence[int] | NDArray[np.integer]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """List the simplices of some orbits.
 
         Returns

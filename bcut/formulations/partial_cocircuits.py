@@ -94,11 +94,14 @@ def _faces(
     return rows[keep].reshape(len(rows), -1 if len(rows) else simplices.shape[1] - 1)
 
 
-def _covering(configuration: PointConfiguration, simplices: NDArray[np.int64], vertex: int) -> NDArray[np.bool_]:
+def _covering(
+    configuration: PointConfiguration, simplices: NDArray[np.int64], vertex: int
+) -> NDArray[np.bool_]:
     """Tell which simplices contain a generic point next to a vertex of the hull.
 
-    The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` as in `bcut.geometry.generic_point`. As v_0 is a vertex of
-    the hull, only simplices with that vertex come so close to it, and the facets opposite to it are far away.
+    The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` as in `bcut.geometry.generic_point`. As v_0 is a
+    vertex of the hull, only simplices with that vertex come so close to it, and the facets opposite to it are far
+    away.
     """
     order = [vertex, *(p for p in range(configuration.n) if p != vertex)]
     points = configuration.scalars()

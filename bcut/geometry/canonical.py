@@ -1,13 +1,13 @@
 """Least images of point sets under a permutation group, for many sets at once.
 
 The least image of a set S is the lexicographically first among the sets g(S), written in ascending order. It is found
-element by element: its first element is the least point in the orbits of the points of S; of the ways to get there, those
-survive that lead to the least second element under the stabiliser of the first; and so on, as in S. Linton, "Finding the
-smallest image of a set" (ISSAC 2004), but breadth first, with arrays over all sets and all ways.
+element by element: its first element is the least point in the orbits of the points of S; of the ways to get there,
+those survive that lead to the least second element under the stabiliser of the first; and so on, as in S. Linton,
+"Finding the smallest image of a set" (ISSAC 2004), but breadth first, with arrays over all sets and all ways.
 
-The stabilisers are nodes of a tree: the children of the node of (s_0, ..., s_j) stabilise one point more. Each node is a
-table of the least point in every point's orbit, and of an element that takes the point there. Nodes are made when they
-are first needed.
+The stabilisers are nodes of a tree: the children of the node of (s_0, ..., s_j) stabilise one point more. Each node
+is a table of the least point in every point's orbit, and of an element that takes the point there. Nodes are made
+when they are first needed.
 """
 
 from __future__ import annotations
@@ -104,12 +104,8 @@ class CanonicalForms:
             walk = _Walk(self, np.asarray(sets[part]), None if extras is None else np.asarray(extras[part]))
             for _ in range(sets.shape[1]):
                 walk.step(None)
-            parts.append((start, walk.finish()))
-        return LeastImages(
-            *(np.concatenate([getattr(p, name) for _, p in parts]) for name in ("images", "stabilisers")),
-            np.concatenate([start + p.owners for start, p in parts]),
-            *(np.concatenate([getattr(p, name) for _, p in parts]) for name in ("extras", "fixing")),
-        )
+            parts.append(walk.finish())
+        return _joined(parts)
 
     def are_least(self, sets: NDArray[np.integer]) -> tuple[NDArray[np.intp], LeastImages]:
         """Tell which of some sets, in ascending order, are their own least images.
@@ -122,20 +118,13 @@ class CanonicalForms:
             Of these alone.
         """
         rows, parts = [], []
-        count = 0
         for start in range(0, max(1, len(sets)), _CHUNK):
             walk = _Walk(self, np.asarray(sets[start : start + _CHUNK]), None)
             for position in range(sets.shape[1]):
                 walk.step(position)
-            part = walk.finish()
             rows.append(start + walk.kept)
-            parts.append((count, part))
-            count += len(part.images)
-        return np.concatenate(rows), LeastImages(
-            *(np.concatenate([getattr(p, name) for _, p in parts]) for name in ("images", "stabilisers")),
-            np.concatenate([first + p.owners for first, p in parts]),
-            *(np.concatenate([getattr(p, name) for _, p in parts]) for name in ("extras", "fixing")),
-        )
+            parts.append(walk.finish())
+        return np.concatenate(rows), _joined(parts)
 
     def least_in_orbit(self, prefixes: NDArray[np.integer]) -> NDArray[np.int64]:
         """Return the least point in every point's orbit under the stabilisers of points, shape (m, k) to (m, n).
@@ -184,7 +173,9 @@ class CanonicalForms:
         least = images.min(axis=0).astype(np.int64)
         return self._add_node(least, members[images.argmin(axis=0)], members)
 
-    def _add_node(self, least: NDArray[np.int64], moves: NDArray[np.int64], members: NDArray[np.int64]) -> int:
+    def _add_node(
+        self, least: NDArray[np.int64], moves: NDArray[np.int64], members: NDArray[np.int64]
+    ) -> int:
         number = len(self._members)
         if number == len(self._children):
             self._least = np.concatenate((self._least, np.empty_like(self._least)))
@@ -199,6 +190,18 @@ class CanonicalForms:
         self._tables.append(elements.astype(self.dtype))
         self._table_size += len(elements)
         return numbers
+
+
+def _joined(parts: list[LeastImages]) -> LeastImages:
+    """Put the least images of parts of a list together."""
+    first = np.cumsum([0, *(len(part.images) for part in parts[:-1])])
+    return LeastImages(
+        np.concatenate([part.images for part in parts]),
+        np.concatenate([part.stabilisers for part in parts]),
+        np.concatenate([start + part.owners for start, part in zip(first, parts, strict=True)]),
+        np.concatenate([part.extras for part in parts]),
+        np.concatenate([part.fixing for part in parts]),
+    )
 
 
 class _Walk:

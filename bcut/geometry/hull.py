@@ -24,9 +24,7 @@ def vertices_of_hull(hull_facets: Sequence[Sequence[int]], n: int) -> list[int]:
     return np.flatnonzero(((missing == 0).sum(axis=1) == 1) & member.any(axis=0)).tolist()
 
 
-def lie_on_hull(
-    sets: NDArray[np.integer], hull_facets: Sequence[Sequence[int]], n: int
-) -> NDArray[np.bool_]:
+def lie_on_hull(sets: NDArray[np.integer], hull_facets: Sequence[Sequence[int]], n: int) -> NDArray[np.bool_]:
     """Tell which point sets, shape (m, k), lie in a common facet of the hull."""
     found = np.zeros(len(sets), dtype=bool)
     for row in incidence(hull_facets, n):

@@ -1,9 +1,9 @@
 """Orbits of simplices under a symmetry group, without listing the simplices.
 
-Representatives are least images (`bcut.geometry.canonical`). The beginning of a least image is the least image of itself,
-so the representatives with k points are found among the representatives with k - 1 points and one greater point each
-("orderly generation": R. C. Read, "Every one a winner", 1978). Nothing is compared with anything else, and memory holds
-little more than the representatives.
+Representatives are least images (`bcut.geometry.canonical`). The beginning of a least image is the least image of
+itself, so the representatives with k points are found among the representatives with k - 1 points and one greater
+point each ("orderly generation": R. C. Read, "Every one a winner", 1978). Nothing is compared with anything else, and
+memory holds little more than the representatives.
 
 All decisions about dependence and sides are exact.
 """
@@ -68,7 +68,8 @@ class SimplexOrbits:
     @cached_property
     def facet_is_interior(self) -> NDArray[np.bool_]:
         """Whether the facets of each orbit have points strictly on both sides, shape (f,)."""
-        return (self.facet_sides > 0).any(axis=1) & (self.facet_sides < 0).any(axis=1)
+        above, below = self.facet_sides > 0, self.facet_sides < 0
+        return np.asarray(above.any(axis=1) & below.any(axis=1))
 
     @property
     def number_of_simplices(self) -> int:
@@ -83,19 +84,20 @@ def simplex_orbits(configuration: PointConfiguration, group: PermutationGroup) -
     ----------
     configuration : PointConfiguration
     group : PermutationGroup
-        Of affine symmetries of the configuration, such as `bcut.geometry.symmetry.symmetry_group` returns or a subgroup.
+        Of affine symmetries of the configuration, such as `bcut.geometry.symmetry.symmetry_group` returns or a
+        subgroup.
 
     Raises
     ------
     TooLargeError
         If the stabiliser of a point in the group is too large to be listed.
     """
-    d, n = configuration.dimension, configuration.n
+    d = configuration.dimension
     forms = CanonicalForms(group)
     sets = forms.roots[:, None]
     span = _Span.of(configuration)
     for _ in range(d - 1):
-        sets = _extended(forms, sets, None if span is None else span)[0]
+        sets = _extended(forms, sets, span)[0]
     # Dependent sets that nothing has excluded so far have no point on either side.
     sides = facet_sides(configuration, sets)
     independent = sides.any(axis=1)

@@ -35,7 +35,7 @@ class PartialChirotope(Chirotope):
         object.__setattr__(self, "_hull_facets", hull_facets)
 
     @property
-    def hull_facets(self) -> tuple[tuple[int, ...], ...]:  # type: ignore[override]
+    def hull_facets(self) -> tuple[tuple[int, ...], ...]:
         """Facets of the convex hull, each as the ascending tuple of all configuration points on it."""
         facets: tuple[tuple[int, ...], ...] = self.__dict__["_hull_facets"]
         return facets
@@ -53,26 +53,26 @@ class PartialChirotope(Chirotope):
         )
 
     @property
-    def bases(self) -> NoReturn:  # type: ignore[override]
+    def bases(self) -> NoReturn:
         """Refuse: there are too many."""
         self._refuse()
 
     @property
-    def facets(self) -> NoReturn:  # type: ignore[override]
+    def facets(self) -> NoReturn:
         """Refuse: there are too many."""
         self._refuse()
 
     @property
-    def sides(self) -> NoReturn:  # type: ignore[override]
+    def sides(self) -> NoReturn:
         """Refuse: there are too many."""
         self._refuse()
 
     @property
-    def facet_is_interior(self) -> NoReturn:  # type: ignore[override]
+    def facet_is_interior(self) -> NoReturn:
         """Refuse: there are too many."""
         self._refuse()
 
     @property
-    def is_general(self) -> NoReturn:  # type: ignore[override]
+    def is_general(self) -> NoReturn:
         """Refuse: it takes all signs to tell."""
         self._refuse()

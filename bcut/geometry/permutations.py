@@ -1,7 +1,7 @@
 """Permutation groups on the points of a configuration, as stabiliser chains of arrays.
 
-A permutation is an array g of images: point i goes to ``g[i]``, and ``g[h]`` is "first h, then g". Elements are listed
-only where their number allows it; everything else works with the chain.
+A permutation is an array g of images: point i goes to ``g[i]``, and ``g[h]`` is "first h, then g". Elements are
+listed only where their number allows it; everything else works with the chain.
 """
 
 from __future__ import annotations
@@ -112,6 +112,18 @@ class PermutationGroup:
                 raise TooLargeError(f"the permutations generate a group of more than {limit:,} elements")
         return cls.from_elements(elements)
 
+    def reduced(self, limit: int) -> PermutationGroup:
+        """Return the largest group of the chain with at most `limit` elements: it fixes the first base points.
+
+        Of a group from `symmetry_group` or `from_elements`, whose generators are strong ones.
+        """
+        levels = list(self.levels)
+        generators = self.generators
+        while prod(len(level.orbit) for level in levels) > limit:
+            gone = levels.pop(0)
+            generators = generators[generators[:, gone.point] == gone.point]
+        return self if len(levels) == len(self.levels) else PermutationGroup(self.n, generators, levels)
+
     @property
     def base(self) -> tuple[int, ...]:
         """Base points: only the identity fixes them all."""
@@ -142,7 +154,9 @@ class PermutationGroup:
             If the order exceeds `limit`.
         """
         if self.order > limit:
-            raise TooLargeError(f"a group of order {self.order:,} is not listed; at most {limit:,} elements are")
+            raise TooLargeError(
+                f"a group of order {self.order:,} is not listed; at most {limit:,} elements are"
+            )
         return np.concatenate(list(self.blocks()))
 
     def point_orbits(self) -> NDArray[np.int64]:
@@ -168,7 +182,9 @@ class PermutationGroup:
             for step in steps:
                 # A new point p whose image under the step is known already: step first, then the known element.
                 new = np.flatnonzero(~known & known[step])
-                found[new] = np.take_along_axis(found[step[new]], np.tile(step, (len(new), 1)).astype(np.int64), axis=1)
+                found[new] = np.take_along_axis(
+                    found[step[new]], np.tile(step, (len(new), 1)).astype(np.int64), axis=1
+                )
                 known[new] = True
         return found
 
@@ -183,7 +199,9 @@ class PermutationGroup:
         least = self.point_orbits()
         size = self.order // int((least == least[point]).sum())
         if size > limit or (self.order > 50 * limit and self.base[:1] != (point,)):
-            raise TooLargeError(f"the stabiliser of point {point} has {size:,} elements; at most {limit:,} are listed")
+            raise TooLargeError(
+                f"the stabiliser of point {point} has {size:,} elements; at most {limit:,} are listed"
+            )
         if self.base[:1] == (point,):
             return PermutationGroup(self.n, self.generators[:0], self.levels[1:]).elements(limit=limit)
         return np.concatenate([block[block[:, point] == point] for block in self.blocks()])
@@ -199,7 +217,9 @@ class PermutationGroup:
         """
         if not len(self.generators) or np.all(keeps(self.generators)):
             return self
-        return PermutationGroup.from_elements(np.concatenate([block[keeps(block)] for block in self.blocks()]))
+        return PermutationGroup.from_elements(
+            np.concatenate([block[keeps(block)] for block in self.blocks()])
+        )
 
     def orbit(self, subset: Sequence[int]) -> NDArray[np.int64]:
         """Return all images of a set of points, shape (length, k), ascending rows in lexicographic order."""

@@ -88,8 +88,8 @@ class Stars:
         The interior faces (in no facet of the convex hull) that some simplex contains.
     starts : ndarray of int, shape (f + 1,)
         Where the wedges of each face begin in the arrays below.
-    columns, tails, heads : ndarray of int, shape (wedges,)
-        The simplex of each wedge, and the points it turns from and to.
+    face_of, columns, tails, heads : ndarray of int, shape (wedges,)
+        The face and the simplex of each wedge, and the points it turns from and to.
     """
 
     def __init__(self, chirotope: Chirotope, simplices: NDArray[np.int64]) -> None:
@@ -114,6 +114,7 @@ class Stars:
         self.columns = np.tile(np.arange(len(simplices)), len(tails))[order]
         self.tails = np.concatenate(tails)[order]
         self.heads = np.concatenate(heads)[order]
+        self.face_of = np.repeat(np.arange(len(used)), np.diff(self.starts))
         self._known: dict[int, Star] = {}
 
     def _interior_faces(self) -> NDArray[np.bool_]:
@@ -166,13 +167,36 @@ class Stars:
     def _turns(self, face: NDArray[np.int64], points: NDArray[np.int64]) -> NDArray[np.int8]:
         """Return the orientations of face + (a, b) for all pairs of points, shape (len(points), len(points))."""
         rows, columns = np.triu_indices(len(points), 1)
-        tuples = np.empty((len(rows), len(face) + 2), dtype=np.int64)
-        tuples[:, :-2] = face
-        tuples[:, -2], tuples[:, -1] = points[rows], points[columns]
-        # The face and the pairs ascend, so only members of the face behind a point count as inversions.
-        inversions = (face > tuples[:, -2:-1]).sum(axis=1) + (face > tuples[:, -1:]).sum(axis=1)
-        signs = self.chirotope.orientations(np.sort(tuples, axis=1)) * np.where(inversions & 1, -1, 1).astype(np.int8)
         table = np.zeros((len(points), len(points)), dtype=np.int8)
-        table[rows, columns] = signs
-        table[columns, rows] = -signs
+        table[rows, columns] = self.turns(
+            np.broadcast_to(face, (len(rows), len(face))), points[rows], points[columns]
+        )
+        table[columns, rows] = -table[rows, columns]
         return table
+
+    def turns(
+        self, faces: NDArray[np.int64], first: NDArray[np.int64], second: NDArray[np.int64]
+    ) -> NDArray[np.int8]:
+        """Tell how one turns around a face from one point to another, the short way.
+
+        Parameters
+        ----------
+        faces : ndarray of int, shape (k, d - 1)
+        first, second : ndarray of int, shape (k,)
+            Points that are no vertices of the face.
+
+        Returns
+        -------
+        ndarray of int8, shape (k,)
+            1 for counter-clockwise, -1 for clockwise, 0 where both directions are equal or opposite.
+        """
+        tuples = np.concatenate((faces, first[:, None], second[:, None]), axis=1)
+        # The face ascends, so inversions are vertices of it behind a point, and the two points themselves.
+        inversions = (
+            (faces > first[:, None]).sum(axis=1) + (faces > second[:, None]).sum(axis=1) + (first > second)
+        )
+        signs = np.where(inversions & 1, -1, 1).astype(np.int8)
+        different = first != second
+        signs[~different] = 0
+        signs[different] *= self.chirotope.orientations(np.sort(tuples[different], axis=1))
+        return signs

@@ -1,7 +1,8 @@
 """Small subgroups of a permutation group, one of each kind, to look for symmetric triangulations with.
 
-Conjugate subgroups leave triangulations invariant that are images of each other, so one of them is enough. Subgroups are
-drawn at random, and told apart by what conjugation does not change: how many elements of each cycle type they have.
+Conjugate subgroups leave triangulations invariant that are images of each other, so one of them is enough. Subgroups
+are drawn at random, and told apart by what conjugation does not change: how many elements of each cycle type they
+have.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ def some_subgroups(
     """
     rng = np.random.default_rng(seed)
     found: dict[Kind, PermutationGroup] = {}
+    draws = 0 if group.is_trivial else draws
     for _ in range(draws):
         pair = [random_element(group, rng) for _ in range(2)]
         # Powers have small orders, and so generate small groups with a better chance.

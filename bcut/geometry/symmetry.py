@@ -1,13 +1,14 @@
 """The affine symmetries of a point configuration, as permutations of its points, found by search and proven exactly.
 
-Let V be the (d+1) x n matrix of the homogeneous coordinates (columns (p_i, 1)), and P = V^T (V V^T)^-1 V, the orthogonal
-projection onto its row space. A permutation comes from an affine map of space exactly when it maps the row space to
-itself, that is, when it leaves the matrix P unchanged: ``P[g(i), g(j)] = P[i, j]``. So the symmetries are the
-automorphisms of a complete graph with coloured edges, and the images of an affine basis determine each of them, because
-the vectors that P is the Gram matrix of are determined by their products with d + 1 independent ones among them.
+Let V be the (d+1) x n matrix of the homogeneous coordinates (columns (p_i, 1)), and P = V^T (V V^T)^-1 V, the
+orthogonal projection onto its row space. A permutation comes from an affine map of space exactly when it maps the row
+space to itself, that is, when it leaves the matrix P unchanged: ``P[g(i), g(j)] = P[i, j]``. So the symmetries are
+the automorphisms of a complete graph with coloured edges, and the images of an affine basis determine each of them,
+because the vectors that P is the Gram matrix of are determined by their products with d + 1 independent ones among
+them.
 
-P is computed exactly in the number field of the coordinates. Each permutation that the search returns leaves the exact
-matrix unchanged, which proves it; `is_symmetry` proves it again, in another way, from the coordinates.
+P is computed exactly in the number field of the coordinates. Each permutation that the search returns leaves the
+exact matrix unchanged, which proves it; `is_symmetry` proves it again, in another way, from the coordinates.
 """
 
 from __future__ import annotations
@@ -124,7 +125,8 @@ def _inverse_up_to_scale(matrix: Exact, field: RealField) -> Exact:
 def _integers(rows: list[list[Fraction | AlgebraicNumber]], field: RealField) -> Exact:
     """Return field elements over a common denominator, without it, shape (a, b, r)."""
     coefficients = [
-        [value.coefficients if isinstance(value, AlgebraicNumber) else (value,) for value in row] for row in rows
+        [value.coefficients if isinstance(value, AlgebraicNumber) else (value,) for value in row]
+        for row in rows
     ]
     denominator = lcm(*(c.denominator for row in coefficients for entry in row for c in entry))
     result = np.empty((len(rows), len(rows[0]), field.degree), dtype=object)
@@ -135,7 +137,7 @@ def _integers(rows: list[list[Fraction | AlgebraicNumber]], field: RealField) ->
 
 
 def _colours(exact: Exact) -> NDArray[np.int64]:
-    """Number the different values of an array over the field, shape (..., r) to (...)."""
+    """Give numbers to the different values of an array over the field, shape (..., r) to (...)."""
     flat = exact.reshape(-1, exact.shape[-1])
     number: dict[tuple[int, ...], int] = {}
     colours = [number.setdefault(tuple(entry), len(number)) for entry in flat.tolist()]
@@ -175,7 +177,9 @@ class _Search:
         self.factors = rng.integers(1, 2**63, size=len(base) + 1, dtype=np.uint64) | np.uint64(1)
         self.mixed = rng.integers(0, 2**63, size=int(matrix.max()) + 1, dtype=np.uint64)[matrix]
         rows = np.sort(matrix, axis=1)
-        classes = np.unique(np.column_stack((np.diagonal(matrix), rows)), axis=0, return_inverse=True)[1].reshape(-1)
+        classes = np.unique(np.column_stack((np.diagonal(matrix), rows)), axis=0, return_inverse=True)[
+            1
+        ].reshape(-1)
         self.codes = [rng.integers(0, 2**63, size=int(classes.max()) + 1, dtype=np.uint64)[classes]]
         for depth, point in enumerate(base):
             self.codes.append(self._extended(self.codes[-1], depth, point))

@@ -7,18 +7,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import lcm
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bcut.errors import InputError
-from bcut.formulations.formulation import Formulation
+from bcut.geometry.configuration import PointConfiguration
 
 Sense = Literal["min", "max"]
 
 # Integer costs up to this size keep all exact bound computations within 64 bits.
 _MAX_NUMERATOR = 1 << 40
+
+
+class Candidates(Protocol):
+    """Whatever has simplices that get costs: a formulation, of all simplices or of one of each orbit."""
+
+    @property
+    def configuration(self) -> PointConfiguration:
+        """The points."""
+
+    @property
+    def simplices(self) -> NDArray[np.int64]:
+        """Ascending vertices, shape (m, d + 1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,15 +95,15 @@ def from_fractions(name: str, sense: Sense, costs: Sequence[Fraction]) -> Object
     return Objective(name, sense, numerators, denominator)
 
 
-def make_objective(text: str, formulation: Formulation, *, sense: str = "min") -> Objective:
+def make_objective(text: str, formulation: Candidates, *, sense: str = "min") -> Objective:
     """Make the objective that a user wrote: ``MEASURE`` or ``MEASURE:ARGUMENT``.
 
     Parameters
     ----------
     text : str
         The name of a measure, with its argument where it takes one (``costs:FILE``, ``random-costs:SEED``).
-    formulation : Formulation
-        Whose simplices get costs.
+    formulation : Candidates
+        Whose simplices get costs, such as a `Formulation`.
     sense : {"min", "max"}
 
     Raises

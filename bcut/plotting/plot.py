@@ -78,9 +78,11 @@ def plot(
         draw_space(figure, points, simplices, explode=explode, labels=labels)
     if title:
         figure.suptitle(title, fontsize=13)
-    with replacing(target) as temporary:
-        # Without a date the same result gives the same file.
-        metadata = {"Date": None} if target.suffix == ".svg" else None
+    from matplotlib import rc_context
+
+    # Without a date, and with names that are no random numbers, the same result gives the same file.
+    metadata = {"Date": None} if target.suffix == ".svg" else None
+    with replacing(target) as temporary, rc_context({"svg.hashsalt": "bcut"}):
         figure.savefig(temporary, dpi=150, metadata=metadata, bbox_inches="tight", pad_inches=0.05)
 
 

@@ -75,7 +75,7 @@ class TreeResult:
     status : {"optimal", "infeasible", "limit", "interrupted"}
         "infeasible" also when nothing is better than the cutoff.
     columns : ndarray of int, or None
-        The chosen simplices of the best solution.
+        The chosen simplices of the best solution; where nothing is better than the cutoff, perhaps one that is not.
     bound : float or None
         SCIP's dual bound, in the sense of the objective.
     nodes : int

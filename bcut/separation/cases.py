@@ -64,7 +64,7 @@ CASES = (
     CaseName("cross-polytope:4"),
     CaseName("simplex-product:2,2"),
     CaseName("cyclic:9,4"),
-    CaseName("random:9,4,seed=1"),
+    CaseName("random:9,4,seed=3"),
     CaseName("cyclic:8,5"),
 )
 

@@ -12,6 +12,7 @@ import importlib.metadata
 import importlib.util
 import inspect
 import pkgutil
+import re
 import sys
 import traceback
 from dataclasses import dataclass, field
@@ -36,10 +37,10 @@ class Specification:
     @classmethod
     def parse(cls, text: str) -> Specification:
         """Split ``source[:Class][:name=value,...]``."""
-        source, *rest = text.split(":")
-        # A colon behind a single letter is a drive, not a separator of parts.
-        if len(source) == 1 and rest and rest[0][:1] in ("/", "\\"):
-            source, rest = f"{source}:{rest[0]}", rest[1:]
+        # A path may hold colons itself, behind a drive for one, so it ends where ".py" does.
+        path = re.match(r".+?\.py(?=:|$)", text)
+        source = path.group() if path else text.partition(":")[0]
+        rest = text[len(source) + 1 :].split(":") if len(text) > len(source) else []
         class_name: str | None = None
         parameters: dict[str, str] = {}
         for part in rest:
@@ -56,6 +57,8 @@ class Specification:
                     raise SeparatorLoadError(
                         f"separator '{text}': cannot read the parameter '{item}'; write parameter=value"
                     )
+                if name.strip() in parameters:
+                    raise SeparatorLoadError(f"separator '{text}': parameter '{name.strip()}' is given twice")
                 parameters[name.strip()] = value.strip()
         return cls(source, class_name, parameters)
 
@@ -111,6 +114,11 @@ def parameters_of(family: type[Separator]) -> dict[str, Any]:
 
 def _class_by_name(specification: Specification) -> type[Separator]:
     name = specification.source
+    if specification.class_name is not None:
+        raise SeparatorLoadError(
+            f"separator '{name}:{specification.class_name}': a class is chosen in a file; "
+            "after a name write parameter=value,..."
+        )
     if name in built_in_names():
         return _built_in(name)
     entries = importlib.metadata.entry_points(group=GROUP)

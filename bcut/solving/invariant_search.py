@@ -1,0 +1,128 @@
+"""Good triangulations of symmetric configurations: those that a subgroup of the symmetries maps to themselves.
+
+An invariant triangulation is made of whole orbits, so the programs are smaller by the order of the subgroup, and a
+solver that finds nothing on the whole program finds an optimum, or refutes the kind of symmetry, in a moment. Famous
+minimal triangulations, such as those of the cubes up to dimension 6, turn out to have symmetries.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.formulations.formulation import Formulation
+from bcut.formulations.invariant import InvariantProgram, invariant_program
+from bcut.geometry.permutations import PermutationGroup
+from bcut.geometry.subgroups import some_subgroups
+from bcut.objectives.objective import Objective
+
+# Seconds for every subgroup: those that are decided quickly first, the hard ones again later.
+_PASSES = (2.0, 15.0, 90.0)
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantTriangulation:
+    """A triangulation, and what leaves it invariant.
+
+    Attributes
+    ----------
+    columns : ndarray of int
+        Columns of the formulation.
+    value : Fraction
+    subgroup : PermutationGroup
+    attempts : int
+        Programs that were solved.
+    """
+
+    columns: NDArray[np.intp]
+    value: Fraction
+    subgroup: PermutationGroup
+    attempts: int
+
+
+def find_invariant_triangulation(
+    formulation: Formulation,
+    objective: Objective,
+    group: PermutationGroup,
+    *,
+    cutoff: Fraction | None = None,
+    goal: Fraction | None = None,
+    deadline: float | None = None,
+    seed: int = 0,
+    subgroups: Sequence[PermutationGroup] | None = None,
+    on_progress: Callable[[dict[str, Any]], None] | None = None,
+) -> InvariantTriangulation | None:
+    """Look for a triangulation that is invariant under some subgroup.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        Its columns must be closed under the group.
+    objective : Objective
+        Invariant under the group.
+    group : PermutationGroup
+        Of symmetries of the configuration.
+    cutoff : Fraction, optional
+        Only values strictly better than this, of ``sign * objective``, are wanted.
+    goal : Fraction, optional
+        Stop as soon as ``sign * objective`` is at most this.
+    deadline : float, optional
+        Value of `time.monotonic`.
+    seed : int
+        Of the choice of subgroups, and of the solver.
+    subgroups : sequence of PermutationGroup, optional
+        To be tried in this order; small ones of `group` when left out, from the largest on.
+    on_progress : callable, optional
+        Told of every attempt.
+
+    Returns
+    -------
+    InvariantTriangulation or None
+        The best that was found; not verified.
+    """
+    from bcut.scip.host import TreeOptions, branch_and_cut
+
+    sign = objective.sign
+    rest = list(some_subgroups(group, seed=seed) if subgroups is None else subgroups)
+    best: InvariantTriangulation | None = None
+    attempts = 0
+    for seconds in _PASSES:
+        undecided = []
+        for subgroup in rest:
+            left = np.inf if deadline is None else deadline - time.monotonic()
+            if left <= 0:
+                return best
+            program = invariant_program(formulation, subgroup)
+            limit = None if cutoff is None else float(sign * cutoff)
+            options = TreeOptions(seconds=min(seconds, left), seed=seed, cutoff=limit)
+            found = branch_and_cut(
+                program.formulation, invariant_objective(program, objective), options=options
+            )
+            attempts += 1
+            if on_progress is not None:
+                on_progress({"stage": "invariant", "order": subgroup.order, "status": found.status})
+            if found.columns is not None:
+                columns = program.expanded(found.columns)
+                value = objective.value(columns)
+                if cutoff is None or sign * value < cutoff:
+                    best = InvariantTriangulation(columns, value, subgroup, attempts)
+                    cutoff = sign * value
+            if found.status == "interrupted" or (
+                best is not None and goal is not None and cutoff is not None and cutoff <= goal
+            ):
+                return best
+            if found.status == "limit":
+                undecided.append(subgroup)
+        rest = undecided
+    return best
+
+
+def invariant_objective(program: InvariantProgram, objective: Objective) -> Objective:
+    """Return the objective of the variables that stand for whole orbits."""
+    return replace(objective, numerators=objective.numerators[program.representatives] * program.lengths)

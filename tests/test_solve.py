@@ -1,0 +1,439 @@
+"""From an instance to a verified optimum: known optima, brute force, TOPCOM, and what happens at limits."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from oracles import HullCuts, Scripted, Watching, incidence, with_gap
+from reference import assert_triangulation, configuration_or_none
+
+import bcut
+import bcut.instances
+from bcut.errors import InputError, SeparatorError, SeparatorLoadError, SolverError
+from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.simplices import candidate_simplices
+from bcut.geometry.triangulations import count_by_size, triangulations
+from bcut.instance import load_instance
+from bcut.result import Result
+from bcut.separation.seam import Cut, FractionalPoint
+from bcut.solving import strategies
+from bcut.verification.verify import verify
+
+OPTIMA = json.loads(bcut.instances.path("known-optima").read_text(encoding="utf-8"))
+SMALL = [
+    (row, sense)
+    for row in OPTIMA
+    if row["points"] <= 30 and row["dimension"] <= 5
+    for sense in ("min", "max")
+    if row[sense] is not None
+]
+METHODS = ["auto", "scip"]
+
+
+def label(value: Any) -> str:
+    if isinstance(value, dict):
+        return value["instance"] + (" spanning" if value["spanning"] else "")
+    return str(value)
+
+
+def assert_solved(result: Result, value: Any) -> None:
+    assert result.status == "optimal"
+    assert result.value == result.bound == value
+    assert result.gap == 0
+    checked = verify(result)
+    assert checked.value == value
+
+
+@pytest.mark.parametrize(("row", "sense"), SMALL, ids=label)
+def test_known_optima(row: dict[str, Any], sense: str) -> None:
+    result = bcut.solve(row["instance"], sense=sense, spanning=row["spanning"])
+    assert_solved(result, row[sense])
+    assert result.triangulation is not None
+    assert len(result.triangulation) == row[sense]
+    if sense == "min" and row["root_lp_min"] is not None:
+        tolerance = 1e-4 if row["root_lp_min"] != round(row["root_lp_min"], 1) else 1e-6
+        assert result.root.lp == pytest.approx(row["root_lp_min"], abs=tolerance)
+
+
+def test_every_known_optimum_up_to_dimension_four_is_among_them() -> None:
+    assert len([row for row, _ in SMALL if row["dimension"] <= 4]) >= 66
+
+
+@pytest.mark.parametrize(
+    ("instance", "lp", "value"),
+    [
+        ("random:12,3,seed=1000", Fraction(33, 2), 17),
+        ("random:14,3,seed=1000", Fraction(41, 2), 21),
+        ("random:16,3,seed=1000", Fraction(49, 2), 25),
+        ("random:16,3,seed=1002", Fraction(49, 2), 25),
+        ("random:20,3,seed=1000", Fraction(71, 2), 36),
+        ("random:20,3,seed=1001", Fraction(103, 3), 35),
+        ("random:20,3,seed=1002", Fraction(71, 2), 36),
+    ],
+)
+def test_random_points_whose_relaxation_is_fractional(instance: str, lp: Fraction, value: int) -> None:
+    result = bcut.solve(instance, spanning=True)
+    assert_solved(result, value)
+    assert result.root.lp == pytest.approx(float(lp), abs=1e-6)
+    assert result.problem.spanning
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("instance", "spanning", "sense", "value"),
+    [
+        ("cube:3", False, "min", 5),
+        ("cube:3", False, "max", 6),
+        ("cube:4", False, "min", 16),
+        ("random:12,3,seed=1000", True, "min", 17),
+        ("icosahedron", False, "max", 20),
+        ("grid:3,3", True, "max", 8),
+    ],
+)
+def test_both_methods_agree(instance: str, spanning: bool, sense: str, value: int, method: str) -> None:
+    assert_solved(bcut.solve(instance, spanning=spanning, sense=sense, method=method), value)
+
+
+COSTS = f"costs:{bcut.instances.path('pentagon-center-costs')}"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_fractional_example_of_the_paper(method: str) -> None:
+    result = bcut.solve("pentagon-center", objective=COSTS, method=method)
+    assert_solved(result, 1)
+    assert result.problem.costs is not None
+    if method == "auto":
+        assert result.root.lp == pytest.approx(0, abs=1e-9)
+
+
+def test_bound_of_the_fractional_example_of_the_paper() -> None:
+    without = bcut.bound("pentagon-center", objective=COSTS, separators=[])
+    assert (without.status, without.bound, without.triangulation) == ("bound", 0, None)
+    result = bcut.bound("pentagon-center", objective=COSTS, separators=["odd-cycle"])
+    assert (result.status, result.bound, result.value) == ("bound", 1, None)
+    assert result.root.lp == pytest.approx(0, abs=1e-9)
+    assert result.root.lp_after_cuts == pytest.approx(1, abs=1e-6)
+    counts = result.separators["odd-cycle"]
+    assert counts["calls"] >= 1
+    assert counts["found"] >= counts["added"] >= 1
+    assert result.root.rounds[0].cuts == {"odd-cycle": counts["added"]}
+
+
+# Brute force.
+
+
+def costs_file(folder: Path, configuration: PointConfiguration, costs: Any, *, spanning: bool) -> str:
+    simplices = candidate_simplices(Chirotope.of(configuration), spanning=spanning)
+    entries = [[simplex, cost] for simplex, cost in zip(simplices.tolist(), costs, strict=True)]
+    path = folder / "costs.json"
+    path.write_text(json.dumps({"costs": entries}), encoding="utf-8")
+    return f"costs:{path}"
+
+
+SCALES = [
+    lambda c: int(c),
+    lambda c: int(c) * 10**5 + 3,
+    lambda c: int(c) * 10**9 + 7,
+    lambda c: f"{c}/7",
+    lambda c: f"{c}e-12",
+    lambda c: f"{c}e12",
+]
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.integers(2, 3).flatmap(
+        lambda d: st.lists(
+            st.lists(st.integers(0, 4), min_size=d, max_size=d), min_size=d + 2, max_size=8, unique_by=tuple
+        )
+    ),
+    st.booleans(),
+    st.sampled_from(["min", "max"]),
+    st.sampled_from(SCALES),
+    st.sampled_from(METHODS),
+    st.integers(0, 10**6),
+)
+def test_brute_force_on_random_points_with_random_costs(
+    tmp_path: Path, values: Any, spanning: bool, sense: str, scale: Any, method: str, seed: int
+) -> None:
+    configuration = configuration_or_none(values)
+    assume(configuration is not None)
+    chirotope = Chirotope.of(configuration)
+    count = len(candidate_simplices(chirotope, spanning=spanning))
+    costs = [scale(c) for c in np.random.default_rng(seed).integers(-4, 5, size=count)]
+    exact = [Fraction(cost) for cost in costs]
+    found = triangulations(chirotope, spanning=spanning)
+    best = (min if sense == "min" else max)(sum((exact[t] for t in chosen), Fraction(0)) for chosen in found)
+    objective = costs_file(tmp_path, configuration, costs, spanning=spanning)
+    result = bcut.solve(configuration, objective=objective, sense=sense, spanning=spanning, method=method)
+    assert result.status == "optimal"
+    assert verify(result).value == best
+    assert result.triangulation is not None
+    assert_triangulation(configuration.scalars(), result.triangulation, spanning=spanning)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.lists(st.integers(0, 5), min_size=3, max_size=3), min_size=5, max_size=8, unique_by=tuple),
+    st.booleans(),
+)
+def test_sizes_of_smallest_and_largest_triangulations(values: Any, spanning: bool) -> None:
+    configuration = configuration_or_none(values)
+    assume(configuration is not None)
+    sizes = count_by_size(Chirotope.of(configuration), spanning=spanning)
+    assert_solved(bcut.solve(configuration, spanning=spanning), min(sizes))
+    assert_solved(bcut.solve(configuration, spanning=spanning, sense="max"), max(sizes))
+
+
+@pytest.mark.parametrize("sense", ["min", "max"])
+@pytest.mark.parametrize("scale", [1, 1000, 10**6, 10**9, Fraction(1, 3)])
+@pytest.mark.parametrize("number", range(6))
+def test_gaps_are_closed_at_every_scale_of_costs(tmp_path: Path, number: int, scale: Any, sense: str) -> None:
+    formulation, objective, optimum = with_gap(number, sense)
+    costs = [str(int(cost) * scale) for cost in objective.numerators]
+    text = costs_file(tmp_path, formulation.configuration, costs, spanning=True)
+    started = time.monotonic()
+    result = bcut.solve(formulation.configuration, objective=text, spanning=True, sense=sense, separators=[])
+    # Where values lie far apart, targets must not be tried one by one.
+    assert time.monotonic() - started < 10
+    assert result.status == "optimal"
+    assert verify(result).value == optimum * Fraction(scale)
+    assert result.bound == pytest.approx(float(optimum * Fraction(scale)), rel=1e-6)
+
+
+def test_targets_grow_until_one_is_reached(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    formulation, objective, optimum = with_gap(3)
+    targets: list[Fraction] = []
+    reach = strategies._reach
+
+    def recording(search: Any, part: Any, target: Fraction) -> Any:
+        targets.append(target)
+        return reach(search, part, target)
+
+    monkeypatch.setattr(strategies, "_reach", recording)
+    costs = [int(cost) * 50_000 for cost in objective.numerators]
+    text = costs_file(tmp_path, formulation.configuration, costs, spanning=True)
+    result = bcut.solve(formulation.configuration, objective=text, spanning=True, separators=[])
+    assert_solved(result, optimum * 50_000)
+    assert 1 < len(targets) < 15
+    assert targets == sorted(targets)
+
+
+# TOPCOM.
+
+
+def homogeneous(configuration: PointConfiguration) -> str:
+    return json.dumps([[*(int(value) for value in point), 1] for point in configuration.scalars()]) + "\n"
+
+
+def topcom(command: str, configuration: PointConfiguration) -> str:
+    return subprocess.run(
+        [command], input=homogeneous(configuration), capture_output=True, text=True, check=True, timeout=60
+    ).stdout
+
+
+def integer_points(number: int, n: int, d: int, most: int) -> PointConfiguration:
+    points = np.random.default_rng(number).integers(0, most, size=(2 * n, d))
+    return PointConfiguration.from_values(np.unique(points, axis=0)[:n].tolist(), name=f"integer points {number}")
+
+
+TOPCOM_CASES = [(1, 8, 2, 5), (2, 9, 2, 100), (3, 7, 3, 3), (4, 8, 3, 50), (5, 8, 3, 4), (6, 8, 4, 3)]
+
+
+@pytest.mark.skipif(shutil.which("topcom-points2nalltriangs") is None, reason="TOPCOM is not installed")
+@pytest.mark.parametrize("case", TOPCOM_CASES)
+def test_topcom_counts_as_many_triangulations(case: tuple[int, int, int, int]) -> None:
+    configuration = integer_points(*case)
+    chirotope = Chirotope.of(configuration)
+    for command, spanning in (("topcom-points2nalltriangs", False), ("topcom-points2nallfinetriangs", True)):
+        counted = int(topcom(command, configuration).split()[-1])
+        assert sum(count_by_size(chirotope, spanning=spanning).values()) == counted
+
+
+@pytest.mark.skipif(shutil.which("topcom-points2mintriang") is None, reason="TOPCOM is not installed")
+@pytest.mark.parametrize("case", TOPCOM_CASES)
+def test_topcom_finds_the_same_smallest_size(case: tuple[int, int, int, int]) -> None:
+    configuration = integer_points(*case)
+    last = topcom("topcom-points2mintriang", configuration).strip().splitlines()[-1]
+    size = len(re.findall(r"\{[\d,]+\}", last))
+    assert_solved(bcut.solve(configuration), size)
+
+
+# The result.
+
+
+def test_a_result_says_what_was_asked_and_found() -> None:
+    result = bcut.solve("random:12,3,seed=1000", spanning=True, separators=["link", HullLike], seed=3, time_limit=50)
+    question = result.problem
+    assert (question.objective, question.sense, question.spanning) == ("cardinality", "min", True)
+    assert (question.formulation, question.separators, question.seed) == ("2", ["link", "hull-like"], 3)
+    assert question.limits == {"time": 50}
+    assert result.instance.name == "random:12,3,seed=1000"
+    assert len(result.instance.points) == 12
+    formulation = cocircuit_formulation(load_instance("random:12,3,seed=1000"), spanning=True)
+    assert (result.size.columns, result.size.rows) == formulation.size
+    assert result.size.columns_after_fixing is not None
+    assert 0 < result.size.columns_after_fixing < result.size.columns
+    assert set(result.separators) == {"link", "hull-like"}
+    assert result.separators["hull-like"]["calls"] > 0
+    assert set(result.separators["link"]) >= {"calls", "found", "added", "seconds"}
+    assert result.seconds["total"] >= sum(v for k, v in result.seconds.items() if k != "total") - 0.05
+    assert result.triangulation == sorted(result.triangulation or [], key=lambda s: s[::-1])
+    assert json.loads(result.to_json())["value"] == result.value == 17
+    assert list(json.loads(result.to_json()))[0] == "schema"
+
+
+class HullLike(Watching):
+    name = "hull-like"
+
+
+def test_root_rounds_are_unrounded_and_count_cuts() -> None:
+    result = bcut.solve("random:12,3,seed=1000", spanning=True)
+    rounds = result.root.rounds
+    assert rounds[0].lp == pytest.approx(16.5, abs=1e-6)
+    added = sum(finished.cuts.get("link", 0) for finished in rounds)
+    assert added == result.separators["link"]["added"] > 0
+
+
+def test_a_costs_objective_is_embedded_in_the_result(tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    path.write_text('{"default": "1/2", "costs": [[[2, 1, 0], 3]]}', encoding="utf-8")
+    result = bcut.solve("cube:2", objective=f"costs:{path}")
+    path.unlink()
+    assert result.problem.costs == {"default": "1/2", "costs": [[[0, 1, 2], "3"]]}
+    assert verify(result).value == 1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_progress_is_reported(method: str) -> None:
+    seen: list[dict[str, Any]] = []
+    bcut.solve("random:12,3,seed=1000", spanning=True, method=method, separators=[], on_progress=seen.append)
+    assert {"stage", "value", "bound"} <= set(seen[0])
+    assert ("tree" if method == "scip" else "root") in {facts["stage"] for facts in seen}
+    values = [facts["value"] for facts in seen if facts["value"] is not None]
+    assert all(17 <= value for value in values)
+    assert all(facts["bound"] is None or facts["bound"] <= 17 + 1e-6 for facts in seen)
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    results = [bcut.solve("random:12,3,seed=1000", spanning=True, seed=5) for _ in range(2)]
+    assert results[0].triangulation == results[1].triangulation
+    assert [r.lp for r in results[0].root.rounds] == [r.lp for r in results[1].root.rounds]
+
+
+# Limits and failures.
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("sense", ["min", "max"])
+@pytest.mark.parametrize("objective", ["cardinality", "random-costs:1"])
+def test_no_time_at_all_still_gives_a_triangulation(method: str, sense: str, objective: str) -> None:
+    result = bcut.solve("dodecahedron", sense=sense, time_limit=0, method=method, objective=objective)
+    assert result.status == "limit"
+    assert result.triangulation is not None
+    assert_triangulation(load_instance("dodecahedron").scalars(), result.triangulation)
+    assert verify(result).value == pytest.approx(result.value)
+
+
+def test_a_time_limit_keeps_bound_and_triangulation() -> None:
+    started = time.monotonic()
+    result = bcut.solve("icosidodecahedron", sense="max", time_limit=3)
+    assert time.monotonic() - started < 12
+    assert result.status in ("limit", "optimal")
+    assert result.bound is not None
+    assert result.value is not None
+    assert result.bound >= result.value
+    verify(result)
+
+
+def test_bound_with_no_time() -> None:
+    result = bcut.bound("dodecahedron", time_limit=0)
+    assert (result.status, result.value, result.bound, result.triangulation) == ("limit", None, None, None)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_ctrl_c_in_a_separator_hands_out_what_there_is(method: str) -> None:
+    def interrupt(point: FractionalPoint) -> Iterator[Cut]:
+        raise KeyboardInterrupt
+        yield
+
+    result = bcut.solve("dodecahedron", separators=[Scripted(interrupt)], method=method)
+    assert result.status == "interrupted"
+    assert result.triangulation is not None
+    verify(result)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_separator_that_raises_ends_the_solve(method: str) -> None:
+    def fail(point: FractionalPoint) -> Iterator[Cut]:
+        raise OSError("gone")
+        yield
+
+    with pytest.raises(SeparatorError, match="separator 'mine': separate.. raised OSError: gone") as caught:
+        bcut.solve("dodecahedron", separators=[Scripted(fail, "mine")], method=method)
+    assert "in fail" in caught.value.trace
+
+
+def test_a_separator_that_is_invalid_is_not_believed_for_a_triangulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    formulation = cocircuit_formulation(load_instance("cube:3"))
+
+    def dissection(search: Any) -> None:
+        search.offer(np.array([0, 1, 2]))
+        search.status = "optimal"
+
+    monkeypatch.setattr("bcut.solving.api.solve_by_targets", dissection)
+    assert len(formulation.simplices) > 3
+    with pytest.raises(SolverError, match="cube:3: the solver's answer is no triangulation"):
+        bcut.solve("cube:3")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"time_limit": -1}, "time limit -1"),
+        ({"time_limit": float("nan")}, "time limit nan"),
+        ({"time_limit": float("inf")}, "finite number of seconds"),
+        ({"seed": -1}, "seed -1"),
+        ({"method": "magic"}, "unknown method 'magic': known are auto, scip"),
+        ({"formulation": "7"}, "unknown formulation '7'"),
+        ({"sense": "best"}, "'min' or 'max'"),
+        ({"objective": "beauty"}, "unknown objective 'beauty'"),
+    ],
+)
+def test_bad_options_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        bcut.solve("cube:3", **options)
+
+
+@pytest.mark.parametrize(
+    ("separators", "message"),
+    [
+        (["clik"], "unknown separator"),
+        (["clique", "clique:max_cuts=3"], "'clique' is given twice"),
+        ([7], "7 is no separator"),
+        ([dict], "is no separator"),
+    ],
+)
+def test_bad_separators_are_refused(separators: list[Any], message: str) -> None:
+    with pytest.raises(SeparatorLoadError, match=message):
+        bcut.solve("cube:3", separators=separators)
+
+
+def test_separators_may_be_names_classes_or_objects() -> None:
+    for separator in ("link", HullCuts, HullCuts()):
+        result = bcut.solve("random:9,2,seed=1", separators=[separator])
+        assert result.status == "optimal"
