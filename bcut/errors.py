@@ -1,7 +1,7 @@
 """Every error that a user can cause, as one class tree.
 
-Each message says what is wrong, where (the instance, file or plug-in), and how to mend it. The command line prints the
-message and exits with `exit_status`; it never shows a traceback for these, except a plug-in's own.
+Each message says what is wrong, where (the instance, file or plug-in), and how to mend it. The command line
+prints the message and exits with `exit_status`; it never shows a traceback for these, except a plug-in's own.
 """
 
 from __future__ import annotations

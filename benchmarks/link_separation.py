@@ -1,8 +1,9 @@
 """One round of link separation beside one ``scipy.optimize.linprog`` call per face, on the same points.
 
-The reference solves, for every face whose star carries a fractional value, the separation problem as it is first written
-down: variables alpha, weights in [0, 1] and shortest-path potentials for every tail of a wedge over the direction; maximise
-``alpha * y_e - w x``. Both find a violated cut for exactly the same faces, which is checked.
+The reference solves, for every face whose star carries a fractional value, the separation problem as it is
+first written down: variables alpha, weights in [0, 1] and shortest-path potentials for every tail of a wedge
+over the direction; maximise ``alpha * y_e - w x``. Both find a violated cut for exactly the same faces, which
+is checked.
 """
 
 from __future__ import annotations

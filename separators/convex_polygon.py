@@ -2,16 +2,17 @@
 
 Definition
 ----------
-Let V be all points of the configuration in a convex polygon, none of them in its interior, b in number (points
-inside an edge of the polygon count). Triangles of a triangulation with vertices in V overlap nowhere, so their
-angles, pi for each triangle, fit into the angles of the polygon at the points of V, pi (b - 2) together:
+Let V be all points of the configuration in a convex polygon, none of them in its interior, b in number
+(points inside an edge of the polygon count). Triangles of a triangulation with vertices in V overlap nowhere,
+so their angles, pi for each triangle, fit into the angles of the polygon at the points of V, pi (b - 2)
+together:
 
     sum of x over the triangles with vertices in V  <=  b - 2.
 
 This is Definition 1 of the paper with no interior points. A point x of Formulation 2 never violates it: in a
-direction from v into the polygon, the triangles of V at v have a total value of at most 1, because all of them
-contain the same chamber at v; so their angles times x fit as well. That is the paper's Conjecture 1. Points of
-Formulations 0 and 1, and points that are given by hand, can violate it.
+direction from v into the polygon, the triangles of V at v have a total value of at most 1, because all of
+them contain the same chamber at v; so their angles times x fit as well. That is the paper's Conjecture 1.
+Points of Formulations 0 and 1, and points that are given by hand, can violate it.
 
 Separation
 ----------

@@ -2,36 +2,41 @@
 
 Theorem
 -------
-Let e be a (d-2)-simplex of the configuration that lies in no facet of the convex hull. Seen along e, the d-simplices that
-contain e are wedges of less than half a turn, arcs between directions (`bcut.geometry.stars`). For x in the affine hull of
-the triangulations let y_e(x) be the sum of x over the wedges that contain one fixed generic direction; the cocircuit rows
-say that x on the wedges is a circulation, so y_e does not depend on the direction. For any weights w on the wedges let
-alpha be the least weight of a closed walk of arcs that winds exactly once. Then every triangulation satisfies
+Let e be a (d-2)-simplex of the configuration that lies in no facet of the convex hull. Seen along e, the
+d-simplices that contain e are wedges of less than half a turn, arcs between directions
+(`bcut.geometry.stars`). For x in the affine hull of the triangulations let y_e(x) be the sum of x over the
+wedges that contain one fixed generic direction; the cocircuit rows say that x on the wedges is a circulation,
+so y_e does not depend on the direction. For any weights w on the wedges let alpha be the least weight of a
+closed walk of arcs that winds exactly once. Then every triangulation satisfies
 
     sum of w_t x_t over the wedges t of e  >=  alpha * y_e(x).
 
-Proof. If a triangulation uses e, its simplices around e fit together facet to facet and fill a neighbourhood of e exactly
-once: their wedges form one closed walk that winds once, of weight at least alpha, and y_e = 1. If not, both sides are 0.
+Proof. If a triangulation uses e, its simplices around e fit together facet to facet and fill a neighbourhood
+of e exactly once: their wedges form one closed walk that winds once, of weight at least alpha, and y_e = 1.
+If not, both sides are 0.
 
-Why they matter: the circulation of a fractional point also decomposes into closed walks, but some of these wind twice or
-more often, such as five wedges of 144 degrees with value 1/2 each, and no combination of cocircuit rows forbids that.
+Why they matter: the circulation of a fractional point also decomposes into closed walks, but some of these
+wind twice or more often, such as five wedges of 144 degrees with value 1/2 each, and no combination of
+cocircuit rows forbids that.
 
 Separation
 ----------
-The cuts of one star are all satisfied exactly when x on its wedges is a sum of once-winding closed walks. So the separation
-problem is a fractional packing: find once-winding walks of largest total value within the capacities x. A once-winding walk
-has exactly one wedge over a fixed direction, and the rest of it is a path in an acyclic graph from the head of that wedge
-to its tail: a multi-commodity flow with one commodity per tail of a wedge over the direction. By linear programming duality
-the largest packing equals the least w.x over weights w >= 0 for which every once-winding walk weighs at least 1. If it
-equals y_e(x), no link cut of e is violated by x; otherwise the optimal w is the most violated one (with alpha = 1).
-A direction with few tails keeps the program small, and if all of x passes through one node the packing is trivially perfect.
+The cuts of one star are all satisfied exactly when x on its wedges is a sum of once-winding closed walks. So
+the separation problem is a fractional packing: find once-winding walks of largest total value within the
+capacities x. A once-winding walk has exactly one wedge over a fixed direction, and the rest of it is a path
+in an acyclic graph from the head of that wedge to its tail: a multi-commodity flow with one commodity per
+tail of a wedge over the direction. By linear programming duality the largest packing equals the least w.x
+over weights w >= 0 for which every once-winding walk weighs at least 1. If it equals y_e(x), no link cut of e
+is violated by x; otherwise the optimal w is the most violated one (with alpha = 1). A direction with few
+tails keeps the program small, and if all of x passes through one node the packing is trivially perfect.
 
 Exactness
 ---------
-The weights that the linear program returns are rounded to a common small denominator, and alpha is computed again from the
-integers as a shortest path. Wedges outside the support are lifted one after the other, short ones first: each gets the
-least weight for which no once-winding walk weighs less than alpha, so that the cut is as strong there as it can be. All
-of this is integer arithmetic; the violation is checked once more at the end.
+The weights that the linear program returns are rounded to a common small denominator, and alpha is computed
+again from the integers as a shortest path. Wedges outside the support are lifted one after the other, short
+ones first: each gets the least weight for which no once-winding walk weighs less than alpha, so that the cut
+is as strong there as it can be. All of this is integer arithmetic; the violation is checked once more at the
+end.
 """
 
 from __future__ import annotations
@@ -94,9 +99,9 @@ class Link(Separator):
     def faces_to_try(self, x: NDArray[np.floating]) -> list[int]:
         """List the faces whose star is not packed perfectly at first sight.
 
-        A star is where all of it passes through one node: every closed walk goes through that node once a turn, and falls
-        apart there into walks that wind once. The node with the largest flow is the only one to look at, and the wedges
-        that pass its direction elsewhere are told by two orientations each.
+        A star is where all of it passes through one node: every closed walk goes through that node once a
+        turn, and falls apart there into walks that wind once. The node with the largest flow is the only one
+        to look at, and the wedges that pass its direction elsewhere are told by two orientations each.
         """
         stars = self.stars
         wedges = np.flatnonzero(x[stars.columns] > _NOISE)
@@ -181,8 +186,9 @@ def _pack(
 ) -> tuple[float, NDArray[np.float64]]:
     """Pack once-winding walks: one commodity per tail of a wedge over the direction.
 
-    Columns are the wedges over the direction (they start a walk), then each other wedge once for every commodity that can
-    use it. Rows are the capacities, then the balance of each commodity at each node but its sink.
+    Columns are the wedges over the direction (they start a walk), then each other wedge once for every
+    commodity that can use it. Rows are the capacities, then the balance of each commodity at each node but
+    its sink.
     """
     count, nodes = len(tails), len(position)
     starting, inner = np.flatnonzero(over), np.flatnonzero(~over)
@@ -197,7 +203,8 @@ def _pack(
         commodity.append(np.full(len(usable), number))
     wedges, commodities = np.concatenate(wedge), np.concatenate(commodity)
     begins = len(starting)
-    # Entries: capacity, arrival at the head, departure from the tail; none at the sink, none at the start of a walk.
+    # Entries: capacity, arrival at the head, departure from the tail; none at the sink, none at the start of
+    # a walk.
     columns = np.arange(len(wedges))
     arrives = heads[wedges] != sinks[commodities]
     departs = columns >= begins
@@ -243,7 +250,8 @@ def lift_weights(
     Returns
     -------
     alpha : int
-        Least weight of a once-winding closed walk on the support; where there is none, the largest weight, or 1.
+        Least weight of a once-winding closed walk on the support; where there is none, the largest weight, or
+        1.
     all_weights : ndarray of int64, shape (wedges,)
         With these no once-winding closed walk weighs less than alpha.
     """
@@ -275,8 +283,8 @@ _FAR = 1 << 40
 class _Walks:
     """Least weights of paths of at most a turn between the nodes of a star, as wedges are added.
 
-    Node i of the second turn is number size + i, so arcs only go forward, and a path from a head to its tail one turn
-    later completes a once-winding walk.
+    Node i of the second turn is number size + i, so arcs only go forward, and a path from a head to its tail
+    one turn later completes a once-winding walk.
     """
 
     def __init__(self, star: Star) -> None:
@@ -334,8 +342,8 @@ def check_cut(
     Returns
     -------
     bool
-        Whether e is interior, all simplices of the cut contain e, and no once-winding closed walk of wedges has a positive
-        sum of coefficients: then no triangulation violates the cut.
+        Whether e is interior, all simplices of the cut contain e, and no once-winding closed walk of wedges
+        has a positive sum of coefficients: then no triangulation violates the cut.
     """
     stars = Stars(problem.chirotope, problem.simplices)
     matches = np.flatnonzero((stars.faces == np.sort(np.asarray(face))).all(axis=1))

@@ -80,8 +80,8 @@ def assert_triangulation(
 ) -> None:
     """Check that simplices are a triangulation.
 
-    They are exactly when every facet of one of them either lies on the hull and belongs to no other, or belongs to one
-    simplex on each side, and some point on none of their boundaries is covered once.
+    They are exactly when every facet of one of them either lies on the hull and belongs to no other, or
+    belongs to one simplex on each side, and some point on none of their boundaries is covered once.
     """
     chosen = [tuple(simplex) for simplex in simplices]
     assert len(set(chosen)) == len(chosen)

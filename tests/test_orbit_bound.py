@@ -115,6 +115,7 @@ def test_bound_does_not_depend_on_which_subgroup_averages(name: str) -> None:
         ("icosidodecahedron", "max", 83),
         ("truncated-octahedron", "max", 50),
         ("rhombicuboctahedron", "max", 61.25),
+        ("truncated-cube", "min", 25),
     ],
 )
 @pytest.mark.parametrize("method", ["simplex", "interior"])

@@ -63,8 +63,8 @@ def solve_linear_program(
     ----------
     program : LinearProgram
     method : {"simplex", "interior"}
-        A vertex, or an interior point method without crossover: its duals lie inside the set of optimal ones, and so
-        prove as many columns as possible to be useless.
+        A vertex, or an interior point method without crossover: its duals lie inside the set of optimal ones,
+        and so prove as many columns as possible to be useless.
     seconds : float, optional
         Time limit.
 
@@ -107,7 +107,8 @@ def solve_linear_program(
     x, duals = np.array(solution.col_value), np.array(solution.row_dual)
     value = float(program.costs @ x) if len(x) == columns else np.nan
     status = solver.getModelStatus()
-    # Without crossover, HiGHS calls a point that is optimal but not basic "unknown" at times; any duals give a bound.
+    # Without crossover, HiGHS calls a point that is optimal but not basic "unknown" at times; any duals give
+    # a bound.
     if (
         status in (highspy.HighsModelStatus.kOptimal, highspy.HighsModelStatus.kUnknown)
         and len(duals) == rows

@@ -16,9 +16,10 @@ from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut
 
-# From this many columns on, interior point with crossover beats the dual simplex by far on the first relaxation: these
-# programs are massively degenerate. Afterwards the dual simplex starts from the last basis; where it takes more than
-# this share of the number of rows in iterations, starting over with interior point is faster again.
+# From this many columns on, interior point with crossover beats the dual simplex by far on the first
+# relaxation: these programs are massively degenerate. Afterwards the dual simplex starts from the last basis;
+# where it takes more than this share of the number of rows in iterations, starting over with interior point
+# is faster again.
 _INTERIOR_POINT_FROM = 1500
 _SIMPLEX_ITERATIONS = 0.4
 
@@ -60,7 +61,8 @@ class Relaxation:
         self.objective = objective
         self.deadline = deadline
         self.cuts: list[IntegerCut] = []
-        self._costs = objective.sign * objective.costs
+        self._scale = objective.scale
+        self._costs = objective.sign * objective.costs * self._scale
         self._solver = self._load()
 
     def _load(self) -> Any:
@@ -172,8 +174,8 @@ class Relaxation:
         base = self.formulation.matrix.shape[0]
         activity = np.array(solution.row_value)[base:]
         slack = np.array([cut.rhs for cut in self.cuts]) - activity
-        value = self.objective.sign * float(self._costs @ x)
-        return RelaxationPoint(x, value, np.array(solution.row_dual), slack)
+        value = self.objective.sign * float(self._costs @ x) / self._scale
+        return RelaxationPoint(x, value, np.array(solution.row_dual) / self._scale, slack)
 
     def _run(self) -> Any:
         """Run HiGHS within the deadline; return the model status."""

@@ -42,13 +42,14 @@ class RootLimits:
     rounds : int
         Relaxations with cuts, at most.
     stall_rounds : int
-        Stop after this many rounds in a row that moved the bound by less than `stall` (relative to its size).
+        Stop after this many rounds in a row that moved the bound by less than `stall`, relative to the bound
+        or to the largest cost, whichever is larger.
     stall : float
     deadline : float, optional
         Value of `time.monotonic`.
     target : Fraction, optional
-        Only solutions with ``sign * objective <= target`` matter: columns that no such solution can use leave the
-        relaxation, and the loop stops as soon as the bound is proven to exceed it.
+        Only solutions with ``sign * objective <= target`` matter: columns that no such solution can use leave
+        the relaxation, and the loop stops as soon as the bound is proven to exceed it.
     """
 
     rounds: int = 1000
@@ -65,8 +66,8 @@ class RootBound:
     Attributes
     ----------
     status : {"integral", "dry", "stalled", "limit", "target", "infeasible"}
-        Why it ended: an integral point, no more violated cuts, no progress, a limit, a bound beyond the target, or
-        no point at all.
+        Why it ended: an integral point, no more violated cuts, no progress, a limit, a bound beyond the
+        target, or no point at all.
     lp, lp_after_cuts : float or None
         LP values before and after cuts, unrounded; None where none was found in time.
     rounds : list of Round
@@ -75,7 +76,8 @@ class RootBound:
     point : ndarray of float or None
         The last relaxation point.
     columns : ndarray of int
-        The columns of the given formulation that the last relaxation still had; fewer than all only with a target.
+        The columns of the given formulation that the last relaxation still had; fewer than all only with a
+        target.
     cuts : list of IntegerCut
         The cuts in the last relaxation, over `columns`.
     separation : Separation or None
@@ -149,7 +151,8 @@ class _Loop:
             result.first, result.lp = bound, point.value
         if result.last is None or bound.value >= result.last.value:
             result.last = bound
-        moved = previous is None or abs(point.value - previous) > self.limits.stall * max(1.0, abs(previous))
+        size = self.relaxation.objective.largest_cost
+        moved = previous is None or abs(point.value - previous) > self.limits.stall * max(size, abs(previous))
         self.stalled = 0 if moved else self.stalled + 1
 
     def _separate(self, point: RelaxationPoint) -> list[IntegerCut]:

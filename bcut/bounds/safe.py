@@ -4,8 +4,8 @@ For ``min c x`` over ``lower <= A x <= upper``, 0 <= x <= 1, *any* multipliers y
 
     sum_i (y_i lower_i if y_i > 0 else y_i upper_i) + sum_j min(0, c_j - y A_j),
 
-so the duals of a floating-point solver, rounded to dyadic rationals, prove a bound in integer arithmetic, whatever
-tolerances the solver worked with.
+so the duals of a floating-point solver, rounded to dyadic rationals, prove a bound in integer arithmetic,
+whatever tolerances the solver worked with.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class SafeBound:
     multipliers : ndarray of int64, shape (rows,)
         Times ``2**-shift``.
     reduced_costs : ndarray of int64, shape (m,)
-        Times ``2**-shift``, rounded towards minus infinity where costs had to be: x_j = 1 costs at least this much
-        above `value` (or nothing, where negative).
+        Times ``2**-shift``, rounded towards minus infinity where costs had to be: x_j = 1 costs at least this
+        much above `value` (or nothing, where negative).
     shift : int
         Negative where costs or multipliers are huge.
     """

@@ -1,14 +1,14 @@
 """Formulation 2 (the paper, Sec. 2.3.1): cocircuit rows and one coverage row.
 
-For every (d-1)-simplex f that lies in no facet of the convex hull, the chosen simplices on its two sides are equal in
-number: ``sum of x_t over t = f + a, a on the + side, minus the same on the - side, = 0``. These rows make the number
-of chosen simplices over a generic point constant; one more row, "exactly one chosen simplex contains this generic
-point", makes it 1. The integer points are exactly the triangulations, for every configuration (De Loera, Hosten,
-Santos, Sturmfels 1996).
+For every (d-1)-simplex f that lies in no facet of the convex hull, the chosen simplices on its two sides are
+equal in number: ``sum of x_t over t = f + a, a on the + side, minus the same on the - side, = 0``. These rows
+make the number of chosen simplices over a generic point constant; one more row, "exactly one chosen simplex
+contains this generic point", makes it 1. The integer points are exactly the triangulations, for every
+configuration (De Loera, Hosten, Santos, Sturmfels 1996).
 
-The paper writes rows with right-hand side 1 for the (d-1)-simplices on the boundary instead. That is the same where every
-facet of the hull is a simplex, and wrong elsewhere: a square facet of a cube has four triangles, of which a triangulation
-contains two. Hence the coverage row.
+The paper writes rows with right-hand side 1 for the (d-1)-simplices on the boundary instead. That is the same
+where every facet of the hull is a simplex, and wrong elsewhere: a square facet of a cube has four triangles,
+of which a triangulation contains two. Hence the coverage row.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def cocircuit_formulation(
     Returns
     -------
     Formulation
-        Row 0 is the coverage row; the others are the cocircuit rows that have a nonzero entry, in colexicographic order
-        of their (d-1)-simplices.
+        Row 0 is the coverage row; the others are the cocircuit rows that have a nonzero entry, in
+        colexicographic order of their (d-1)-simplices.
     """
     import scipy.sparse as sp
 

@@ -63,9 +63,9 @@ class OrbitFormulation:
     row_faces : ndarray of int64, shape (rows, d)
         The representative of each row's orbit of (d-1)-simplices.
     volumes : ndarray of int64, or of Python integers where they are larger, shape (m,)
-        One coefficient of the volumes of the representatives, divided by what all of them have in common.
+        One coefficient of the volumes of the representatives, up to a common factor.
     volume : int
-        The same of the hull.
+        The same of the hull; positive.
     """
 
     configuration: PointConfiguration
@@ -189,8 +189,10 @@ def _empty(orbits: SimplexOrbits) -> NDArray[np.bool_]:
 def _volume_row(coefficients: NDArray[Any], volume: NDArray[Any]) -> tuple[NDArray[Any], int]:
     """Choose a coefficient in which the hull's volume does not vanish, and divide by the common divisor."""
     place = max(range(len(volume)), key=lambda k: abs(int(volume[k])))
-    row = [int(value) for value in coefficients[:, place]]
-    total = int(volume[place])
+    # In the field, a coefficient of a positive number may be negative.
+    sign = 1 if volume[place] > 0 else -1
+    row = [sign * int(value) for value in coefficients[:, place]]
+    total = sign * int(volume[place])
     divisor = gcd(total, *row)
     reduced = [value // divisor for value in row]
     dtype = np.int64 if max(map(abs, reduced), default=0) < _INT64 else object

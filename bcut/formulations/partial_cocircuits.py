@@ -1,7 +1,8 @@
 """Formulation 2 on some of the simplices, where all of them together are too many for a table.
 
-Rows exist for the interior (d-1)-simplices that one of the given simplices has as a facet; the others are 0 = 0. The
-orientation of a simplex tells on which side of each of its facets it lies, so no other signs are needed.
+Rows exist for the interior (d-1)-simplices that one of the given simplices has as a facet; the others are 0 =
+0. The orientation of a simplex tells on which side of each of its facets it lies, so no other signs are
+needed.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ def partial_cocircuit_formulation(
     Returns
     -------
     Formulation
-        As from `bcut.formulations.cocircuits.cocircuit_formulation`, restricted to these columns, except that the
-        coverage row may be about another generic point.
+        As from `bcut.formulations.cocircuits.cocircuit_formulation`, restricted to these columns, except that
+        the coverage row may be about another generic point.
     """
     import scipy.sparse as sp
 
@@ -99,9 +100,9 @@ def _covering(
 ) -> NDArray[np.bool_]:
     """Tell which simplices contain a generic point next to a vertex of the hull.
 
-    The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` as in `bcut.geometry.generic_point`. As v_0 is a
-    vertex of the hull, only simplices with that vertex come so close to it, and the facets opposite to it are far
-    away.
+    The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` as in `bcut.geometry.generic_point`. As v_0
+    is a vertex of the hull, only simplices with that vertex come so close to it, and the facets opposite to
+    it are far away.
     """
     order = [vertex, *(p for p in range(configuration.n) if p != vertex)]
     points = configuration.scalars()

@@ -1,13 +1,14 @@
 """Least images of point sets under a permutation group, for many sets at once.
 
-The least image of a set S is the lexicographically first among the sets g(S), written in ascending order. It is found
-element by element: its first element is the least point in the orbits of the points of S; of the ways to get there,
-those survive that lead to the least second element under the stabiliser of the first; and so on, as in S. Linton,
-"Finding the smallest image of a set" (ISSAC 2004), but breadth first, with arrays over all sets and all ways.
+The least image of a set S is the lexicographically first among the sets g(S), written in ascending order. It
+is found element by element: its first element is the least point in the orbits of the points of S; of the
+ways to get there, those survive that lead to the least second element under the stabiliser of the first; and
+so on, as in S. Linton, "Finding the smallest image of a set" (ISSAC 2004), but breadth first, with arrays
+over all sets and all ways.
 
-The stabilisers are nodes of a tree: the children of the node of (s_0, ..., s_j) stabilise one point more. Each node
-is a table of the least point in every point's orbit, and of an element that takes the point there. Nodes are made
-when they are first needed.
+The stabilisers are nodes of a tree: the children of the node of (s_0, ..., s_j) stabilise one point more.
+Each node is a table of the least point in every point's orbit, and of an element that takes the point there.
+Nodes are made when they are first needed.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class LeastImages:
     owners : ndarray of int, shape (w,)
         The set of each way, ascending. Ways that agree on the set and on the extra point are merged.
     extras : ndarray of int, shape (w,)
-        Where the way takes the set's extra point; where the pointwise stabiliser of the image is not trivial, further
-        elements may take it elsewhere.
+        Where the way takes the set's extra point; where the pointwise stabiliser of the image is not trivial,
+        further elements may take it elsewhere.
     fixing : ndarray of int64, shape (m,)
         Order of the pointwise stabiliser of each image.
     """
@@ -73,7 +74,8 @@ class CanonicalForms:
         self._tables: list[NDArray[np.integer]] = [np.arange(n, dtype=self.dtype)[None, :]]
         self._table_size = 1
         self._elements = self._tables[0]
-        # By node: least point of every point's orbit, element that leads there, members of the stabiliser, children.
+        # By node: least point of every point's orbit, element that leads there, members of the stabiliser,
+        # children.
         self._least = np.empty((64, n), dtype=self.dtype)
         self._moves = np.empty((64, n), dtype=np.int64)
         self._members: list[NDArray[np.int64]] = []

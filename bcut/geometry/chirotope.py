@@ -1,7 +1,7 @@
 """The chirotope of a point configuration: all that triangulations need to know, as signs.
 
-Everything combinatorial is read off two tables: the orientation of every (d+1)-subset, and for every (d-1)-simplex the
-side on which each point lies.
+Everything combinatorial is read off two tables: the orientation of every (d+1)-subset, and for every
+(d-1)-simplex the side on which each point lies.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ class Chirotope:
     def sides(self) -> NDArray[np.int8]:
         """Side of every point with respect to every d-subset, shape (C(n, d), n).
 
-        Entry (f, a) is the orientation of (f_0, ..., f_{d-1}, a); zero for points on the hyperplane of f, and the whole
-        row is zero where f is affinely dependent.
+        Entry (f, a) is the orientation of (f_0, ..., f_{d-1}, a); zero for points on the hyperplane of f, and
+        the whole row is zero where f is affinely dependent.
         """
         d = self.dimension
         table = np.zeros((comb(self.n, d), self.n), dtype=np.int8)

@@ -19,7 +19,8 @@ from bcut.geometry.configuration import PointConfiguration
 
 Signs = NDArray[np.int8]
 
-# Numbers in the widest layer of minors: large enough to amortise numpy's overhead, small enough for the cache.
+# Numbers in the widest layer of minors: large enough to amortise numpy's overhead, small enough for the
+# cache.
 _CHUNK = 1 << 18
 _UNIT_ROUNDOFF = 2.0**-53
 
@@ -61,7 +62,8 @@ def determinants(rows: list[list[Any]], multiply: Any = np.multiply) -> Any:
     Returns
     -------
     array
-        The determinants. Every intermediate value is a minor, bounded by ``k! * B**k`` for entries bounded by B.
+        The determinants. Every intermediate value is a minor, bounded by ``k! * B**k`` for entries bounded by
+        B.
     """
     d = len(rows)
     minors = {1 << j: rows[0][j] for j in range(d)}
@@ -91,8 +93,8 @@ class _Kernel:
         # Centred numerators: a translation changes no determinant and makes the entries small.
         numerators = configuration.numerators.astype(object)
         numerators = numerators - numerators[0]
-        # Differences are at most twice these. A term of a determinant has one factor from each column, and a product in
-        # the field multiplies bounds by the sum of |structure|, which itself may exceed 64 bits.
+        # Differences are at most twice these. A term of a determinant has one factor from each column, and a
+        # product in the field multiplies bounds by the sum of |structure|, which itself may exceed 64 bits.
         largest = np.abs(numerators).max(axis=(0, 2), initial=1)
         degree = self.field.degree
         growth = 1 if degree == 1 else int(np.abs(self.field.structure).astype(object).sum(axis=(0, 1)).max())
@@ -106,13 +108,14 @@ class _Kernel:
     def _prepare_filter(self, numerators: NDArray[np.object_], largest: NDArray[np.object_]) -> None:
         """Scale each coordinate into [-1, 1] and bound the error of a determinant of differences.
 
-        Scaling a coordinate, at all points alike, changes no sign. With u = 2**-53 and a field of degree r: a scaled
-        coordinate is a sum of at most r terms, each off by at most 3u relative (conversion, basis number, product),
-        summed and scaled with another r roundings, so it is within (3 + r)u of the exact one. A difference is at most 2
-        in size and within (8 + 2r)u. The determinant is a sum of d! products of d such entries; each product goes
-        through d - 1 multiplications and, a minor of size k having k terms, at most 1 + 2 + ... + (d - 1) additions. To
-        first order the error is at most ``d! 2**d d (4 + r) u`` from the entries plus ``d! 2**d d (d + 1)/2 u`` from the
-        arithmetic; the bound below is twice that, which covers the higher orders.
+        Scaling a coordinate, at all points alike, changes no sign. With u = 2**-53 and a field of degree r: a
+        scaled coordinate is a sum of at most r terms, each off by at most 3u relative (conversion, basis
+        number, product), summed and scaled with another r roundings, so it is within (3 + r)u of the exact
+        one. A difference is at most 2 in size and within (8 + 2r)u. The determinant is a sum of d! products
+        of d such entries; each product goes through d - 1 multiplications and, a minor of size k having k
+        terms, at most 1 + 2 + ... + (d - 1) additions. To first order the error is at most ``d! 2**d d (4 +
+        r) u`` from the entries plus ``d! 2**d d (d + 1)/2 u`` from the arithmetic; the bound below is twice
+        that, which covers the higher orders.
         """
         d, degree = self.dimension, self.field.degree
         scales = np.broadcast_to(largest[None, :, None], numerators.shape)

@@ -1,8 +1,8 @@
 """A generic point of the convex hull, given symbolically, and the simplices that contain it.
 
-The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` for a simplex v and an infinitesimal e > 0, so it lies on no
-hyperplane spanned by the configuration, and the side it is on is the first nonzero side among v_0, v_1, ...: signs
-decide, no coordinates are needed.
+The point is ``v_0 + e (v_1 - v_0) + e^2 (v_2 - v_0) + ...`` for a simplex v and an infinitesimal e > 0, so it
+lies on no hyperplane spanned by the configuration, and the side it is on is the first nonzero side among v_0,
+v_1, ...: signs decide, no coordinates are needed.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ from bcut.geometry.determinants import orientation_signs
 class PartialChirotope(Chirotope):
     """Orientations on demand, and the facets of the hull where they are known from elsewhere.
 
-    Everything that lists all subsets (`bases`, `facets`, `sides`, `facet_is_interior`) raises `TooLargeError`.
+    Everything that lists all subsets (`bases`, `facets`, `sides`, `facet_is_interior`) raises
+    `TooLargeError`.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Permutation groups on the points of a configuration, as stabiliser chains of arrays.
 
-A permutation is an array g of images: point i goes to ``g[i]``, and ``g[h]`` is "first h, then g". Elements are
-listed only where their number allows it; everything else works with the chain.
+A permutation is an array g of images: point i goes to ``g[i]``, and ``g[h]`` is "first h, then g". Elements
+are listed only where their number allows it; everything else works with the chain.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ class PermutationGroup:
     ----------
     n : int
     generators : ndarray of int, shape (g, n)
-        Generate the group; strong generators relative to the base of the chain, where they come from a search.
+        Generate the group; strong generators relative to the base of the chain, where they come from a
+        search.
     levels : sequence of Level
         The chain; the group after the last level is trivial.
 
@@ -180,7 +181,8 @@ class PermutationGroup:
         steps = [*self.generators, *(inverse(generator) for generator in self.generators)]
         while not known.all():
             for step in steps:
-                # A new point p whose image under the step is known already: step first, then the known element.
+                # A new point p whose image under the step is known already: step first, then the known
+                # element.
                 new = np.flatnonzero(~known & known[step])
                 found[new] = np.take_along_axis(
                     found[step[new]], np.tile(step, (len(new), 1)).astype(np.int64), axis=1
@@ -194,7 +196,8 @@ class PermutationGroup:
         Raises
         ------
         TooLargeError
-            If there are more than `limit` of them, or so many elements altogether that they cannot be looked through.
+            If there are more than `limit` of them, or so many elements altogether that they cannot be looked
+            through.
         """
         least = self.point_orbits()
         size = self.order // int((least == least[point]).sum())
@@ -212,8 +215,8 @@ class PermutationGroup:
         Parameters
         ----------
         keeps : callable
-            Takes an array of elements, shape (k, n), and returns k truth values. The elements for which it holds must
-            be closed under products, as those that fix something are.
+            Takes an array of elements, shape (k, n), and returns k truth values. The elements for which it
+            holds must be closed under products, as those that fix something are.
         """
         if not len(self.generators) or np.all(keeps(self.generators)):
             return self

@@ -1,8 +1,8 @@
 """A triangulation of any configuration, quickly: placing the points one after the other.
 
-Taken in an order in which each point lies outside the hull of those before it, the new point is joined to every facet of
-the hull that it sees. In lexicographic order of the coordinates every point lies outside, so the triangulation uses all of
-them: it is spanning.
+Taken in an order in which each point lies outside the hull of those before it, the new point is joined to
+every facet of the hull that it sees. In lexicographic order of the coordinates every point lies outside, so
+the triangulation uses all of them: it is spanning.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ class _Growth:
     boundary : dict
         The vertex opposite to each facet that belongs to one simplex only.
     beyond : list of int
-        Points that extend the span to all of space: an orientation within the span is one with these appended.
+        Points that extend the span to all of space: an orientation within the span is one with these
+        appended.
     """
 
     def __init__(self, chirotope: Chirotope, order: list[int]) -> None:

@@ -19,8 +19,9 @@ def candidate_simplices(chirotope: Chirotope, *, spanning: bool = False) -> NDAr
     chirotope : Chirotope
         Of the point configuration.
     spanning : bool
-        Keep only empty simplices: no other point of the configuration anywhere in the closed simplex, its boundary
-        included. A triangulation uses all points exactly when all its simplices are empty (the paper, Sec. 2.4.2).
+        Keep only empty simplices: no other point of the configuration anywhere in the closed simplex, its
+        boundary included. A triangulation uses all points exactly when all its simplices are empty (the
+        paper, Sec. 2.4.2).
 
     Returns
     -------
@@ -34,8 +35,8 @@ def candidate_simplices(chirotope: Chirotope, *, spanning: bool = False) -> NDAr
 def empty(chirotope: Chirotope, simplices: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Tell which simplices contain no point of the configuration besides their vertices.
 
-    A point is in the closed simplex exactly when, for each facet, it is not strictly on the side away from the
-    opposite vertex. The points that are not, one bit each, come from the rows of `Chirotope.sides`.
+    A point is in the closed simplex exactly when, for each facet, it is not strictly on the side away from
+    the opposite vertex. The points that are not, one bit each, come from the rows of `Chirotope.sides`.
     """
     not_below = np.packbits(chirotope.sides >= 0, axis=1)
     not_above = np.packbits(chirotope.sides <= 0, axis=1)

@@ -1,8 +1,9 @@
 """The star of a (d-2)-face, seen along the face: wedges between directions in a plane.
 
-Project along a (d-2)-simplex e (a vertex in the plane, an edge in space). The d-simplices ``e + {a, b}`` become wedges of
-less than half a turn between the directions of a and b, that is, arcs from a to b where b is counter-clockwise of a. The
-directions themselves are the (d-1)-faces ``e + {a}``. All signs come from the chirotope.
+Project along a (d-2)-simplex e (a vertex in the plane, an edge in space). The d-simplices ``e + {a, b}``
+become wedges of less than half a turn between the directions of a and b, that is, arcs from a to b where b is
+counter-clockwise of a. The directions themselves are the (d-1)-faces ``e + {a}``. All signs come from the
+chirotope.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from bcut.geometry.subsets import all_subsets, ranks
 class Star:
     """One face and the wedges around it.
 
-    Nodes are numbered counter-clockwise from an arbitrary first direction; nodes of equal `level` are points in the same
-    direction.
+    Nodes are numbered counter-clockwise from an arbitrary first direction; nodes of equal `level` are points
+    in the same direction.
 
     Attributes
     ----------

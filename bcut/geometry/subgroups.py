@@ -1,8 +1,8 @@
 """Small subgroups of a permutation group, one of each kind, to look for symmetric triangulations with.
 
-Conjugate subgroups leave triangulations invariant that are images of each other, so one of them is enough. Subgroups
-are drawn at random, and told apart by what conjugation does not change: how many elements of each cycle type they
-have.
+Conjugate subgroups leave triangulations invariant that are images of each other, so one of them is enough.
+Subgroups are drawn at random, and told apart by what conjugation does not change: how many elements of each
+cycle type they have.
 """
 
 from __future__ import annotations

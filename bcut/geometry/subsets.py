@@ -1,7 +1,7 @@
 """Subsets of {0, ..., n-1} in colexicographic order, as arrays, with their ranks.
 
-The rank of a subset ``a_0 < a_1 < ... < a_{k-1}`` is ``sum_j C(a_j, j + 1)`` (the combinatorial number system), so a
-subset's place in a table can be computed without searching, and does not depend on n.
+The rank of a subset ``a_0 < a_1 < ... < a_{k-1}`` is ``sum_j C(a_j, j + 1)`` (the combinatorial number
+system), so a subset's place in a table can be computed without searching, and does not depend on n.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ def all_subsets(n: int, k: int) -> Indices:
     """
     table = np.empty((1, 0), dtype=np.int64)
     for size in range(1, k + 1):
-        # In colex order the subsets with largest element m are the first C(m, size-1) smaller ones, with m appended.
+        # In colex order the subsets with largest element m are the first C(m, size-1) smaller ones, with m
+        # appended.
         counts = [comb(m, size - 1) for m in range(size - 1, n)]
         largest = np.repeat(np.arange(size - 1, n, dtype=np.int64), counts)
         starts = np.concatenate(([0], np.cumsum(counts)[:-1]))

@@ -1,8 +1,9 @@
 """All triangulations of a small configuration, one by one.
 
-A search over exact covers: choose the simplex over a generic point, then again and again a (d-1)-simplex that is covered
-on one side only, and each simplex that fits on its other side. Every triangulation is found exactly once, because at
-each step exactly one of the alternatives is in it; and nothing else is found, because chosen simplices never cross.
+A search over exact covers: choose the simplex over a generic point, then again and again a (d-1)-simplex that
+is covered on one side only, and each simplex that fits on its other side. Every triangulation is found
+exactly once, because at each step exactly one of the alternatives is in it; and nothing else is found,
+because chosen simplices never cross.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ def triangulations(chirotope: Chirotope, *, spanning: bool = False) -> Iterator[
     Parameters
     ----------
     chirotope : Chirotope
-        Of the point configuration. Memory grows with the square of the number of candidate simplices, time with the
-        number of triangulations: meant for small ones.
+        Of the point configuration. Memory grows with the square of the number of candidate simplices, time
+        with the number of triangulations: meant for small ones.
     spanning : bool
         Only triangulations that use every point.
 

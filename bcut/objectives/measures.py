@@ -1,8 +1,8 @@
 """Measures of d-simplices, by name. To add one: write a function below and register it.
 
-A measure gets the configuration, some of its simplices and the text behind the colon, and returns one cost for each:
-an array of int64, or a list of `Fraction`. Costs that are not rational are rounded to doubles, and those are then taken
-exactly.
+A measure gets the configuration, some of its simplices and the text behind the colon, and returns one cost
+for each: an array of int64, or a list of `Fraction`. Costs that are not rational are rounded to doubles, and
+those are then taken exactly.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ def random_costs(configuration: PointConfiguration, simplices: Simplices, argume
 def costs_from_file(configuration: PointConfiguration, simplices: Simplices, argument: str) -> Costs:
     """Costs from a JSON file ``{"default": 1, "costs": [[[0, 1, 2], 0], ...]}``.
 
-    Costs are integers, doubles (taken exactly) or rationals as text, "p/q". Simplices that are listed but are no
-    candidates (flat, or not empty when only empty ones are allowed) are ignored.
+    Costs are integers, doubles (taken exactly) or rationals as text, "p/q". Simplices that are listed but are
+    no candidates (flat, or not empty when only empty ones are allowed) are ignored.
     """
     if not argument:
         raise InputError("objective 'costs': name the file, as in costs:my-costs.json")

@@ -6,7 +6,8 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import lcm
+from functools import cached_property
+from math import frexp, lcm
 from typing import Literal, Protocol
 
 import numpy as np
@@ -58,12 +59,23 @@ class Objective:
         """1 for a minimum, -1 for a maximum: solvers minimise ``sign * costs``."""
         return 1 if self.sense == "min" else -1
 
-    @property
+    @cached_property
     def costs(self) -> NDArray[np.float64]:
         """The costs, each rounded once to a double."""
         if self.denominator == 1 and self.numerators.dtype == np.int64:
             return self.numerators.astype(float)
         return np.array([int(value) / self.denominator for value in self.numerators], dtype=float)
+
+    @cached_property
+    def largest_cost(self) -> float:
+        """The largest absolute value of a cost; 1 where all are zero: what differences are to be compared with."""
+        return float(np.abs(self.costs).max(initial=0.0)) or 1.0
+
+    @property
+    def scale(self) -> float:
+        """A power of two that brings costs of unusual size near 1, where solvers' absolute tolerances make sense."""
+        exponent = frexp(self.largest_cost)[1]
+        return 1.0 if -10 <= exponent <= 20 else 2.0**-exponent
 
     @property
     def is_integral(self) -> bool:

@@ -28,8 +28,8 @@ def back_to_front(corners: Floats, towards: Floats) -> list[int]:
     Returns
     -------
     list of int
-        Every tetrahedron after those that it hides. Where they hide each other in a cycle, which no order gets right,
-        the one whose middle is farthest away comes first.
+        Every tetrahedron after those that it hides. Where they hide each other in a cycle, which no order
+        gets right, the one whose middle is farthest away comes first.
     """
     before: list[list[int]] = [[] for _ in corners]
     waiting = np.zeros(len(corners), dtype=int)
@@ -57,9 +57,9 @@ def back_to_front(corners: Floats, towards: Floats) -> list[int]:
 def _hidden_pairs(corners: Floats, towards: Floats) -> list[tuple[int, int]]:
     """Return the pairs (behind, in front) that overlap in projection.
 
-    Two convex polytopes with disjoint interiors are separated by a plane parallel to a face of one or to an edge of
-    each (the separating axis theorem), and the viewer's side of that plane tells which of them is in front. They do not
-    overlap exactly when some separating plane contains the viewing direction.
+    Two convex polytopes with disjoint interiors are separated by a plane parallel to a face of one or to an
+    edge of each (the separating axis theorem), and the viewer's side of that plane tells which of them is in
+    front. They do not overlap exactly when some separating plane contains the viewing direction.
     """
     spread = float(np.abs(corners - corners.mean(axis=(0, 1))).max()) or 1.0
     scaled = corners / spread

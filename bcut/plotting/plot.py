@@ -44,20 +44,20 @@ def plot(
     picture : path
         Ends in ".svg", ".png" or ".pdf".
     explode : float
-        How far tetrahedra are moved apart, in units of their distance from the middle. With 0 they stay where they
-        are and are drawn see-through. Has no effect in 2D.
+        How far tetrahedra are moved apart, in units of their distance from the middle. With 0 they stay where
+        they are and are drawn see-through. Has no effect in 2D.
     labels : bool
         Number the points.
     normalize : bool
-        Draw the affine image whose points spread alike in all directions: regular polygons and solids, whose exact
-        coordinates may be skewed, look regular again.
+        Draw the affine image whose points spread alike in all directions: regular polygons and solids, whose
+        exact coordinates may be skewed, look regular again.
     title : str, optional
 
     Raises
     ------
     InputError
-        If there is no triangulation to draw, it has another dimension, the suffix is unknown, the file cannot be
-        written, or matplotlib is missing.
+        If there is no triangulation to draw, it has another dimension, the suffix is unknown, the file cannot
+        be written, or matplotlib is missing.
     ResultError
         If the result cannot be read.
     """

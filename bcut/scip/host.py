@@ -43,8 +43,8 @@ class TreeOptions:
     scip_separators : bool
         Whether SCIP's own separators run.
     unlimited : tuple of str
-        Separators of SCIP, such as "zerohalf", that run at the root without a limit on rounds or cuts, whether or not
-        the others run.
+        Separators of SCIP, such as "zerohalf", that run at the root without a limit on rounds or cuts,
+        whether or not the others run.
     presolve : bool
     heuristics : bool
     separate_every : int
@@ -75,7 +75,8 @@ class TreeResult:
     status : {"optimal", "infeasible", "limit", "interrupted"}
         "infeasible" also when nothing is better than the cutoff.
     columns : ndarray of int, or None
-        The chosen simplices of the best solution; where nothing is better than the cutoff, perhaps one that is not.
+        The chosen simplices of the best solution; where nothing is better than the cutoff, perhaps one that
+        is not.
     bound : float or None
         SCIP's dual bound, in the sense of the objective.
     nodes : int
@@ -126,12 +127,16 @@ def branch_and_cut(
     """
     options = options or TreeOptions()
     started = time.perf_counter()
-    model, variables = build_model(formulation, objective, cuts=cuts, name=formulation.configuration.name)
+    scale = objective.scale
+    model, variables = build_model(
+        formulation, objective, cuts=cuts, name=formulation.configuration.name, scale=scale
+    )
     _set_parameters(model, options)
+    _set_limits(model, options, time.perf_counter() - started, scale)
     values = LpValues(variables)
     record = RootRecord(objective)
     adapter = _include_adapter(model, separation, values, record, options)
-    observer = Observer(values, record, on_progress)
+    observer = Observer(values, record, on_progress, scale)
     model.includeEventhdlr(observer, "bcut-observer", "records root bounds and reports progress")
     if start is not None:
         _add_start(model, variables, start)
@@ -141,7 +146,7 @@ def branch_and_cut(
         raise captured
     if error is not None:
         raise SolverError(f"SCIP failed on {formulation.configuration.name}: {error}") from error
-    result = _collect(model, variables, record)
+    result = _collect(model, variables, record, scale)
     result.seconds = time.perf_counter() - started
     model.freeProb()
     return result
@@ -151,12 +156,6 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
     model.setParam("randomization/randomseedshift", options.seed % 2**31)
     # One Ctrl-C stops the search and keeps the incumbent.
     model.setParam("misc/catchctrlc", True)
-    if options.seconds is not None:
-        model.setParam("limits/time", min(max(0.0, options.seconds), _LONGEST))
-    if options.nodes is not None:
-        model.setParam("limits/totalnodes", options.nodes)
-    if options.cutoff is not None:
-        model.setObjlimit(options.cutoff)
     if not options.presolve:
         model.setPresolve(SCIP_PARAMSETTING.OFF)
         model.setParam("presolving/maxrestarts", 0)
@@ -171,6 +170,15 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
         _unlimit_rounds(model)
     if not options.heuristics:
         model.setHeuristics(SCIP_PARAMSETTING.OFF)
+
+
+def _set_limits(model: Model, options: TreeOptions, elapsed: float, scale: float) -> None:
+    if options.seconds is not None:
+        model.setParam("limits/time", min(max(0.0, options.seconds - elapsed), _LONGEST))
+    if options.nodes is not None:
+        model.setParam("limits/totalnodes", options.nodes)
+    if options.cutoff is not None:
+        model.setObjlimit(options.cutoff * scale)
 
 
 def _include_adapter(
@@ -215,7 +223,7 @@ def _optimize(model: Model) -> Exception | None:
     return None
 
 
-def _collect(model: Model, variables: list[Variable], record: RootRecord) -> TreeResult:
+def _collect(model: Model, variables: list[Variable], record: RootRecord, scale: float) -> TreeResult:
     status = model.getStatus()
     columns = None
     if model.getNSols() > 0:
@@ -237,7 +245,7 @@ def _collect(model: Model, variables: list[Variable], record: RootRecord) -> Tre
     return TreeResult(
         outcome,
         columns,
-        None if abs(bound) >= model.infinity() else float(bound),
+        None if abs(bound) >= model.infinity() else float(bound) / scale,
         int(model.getNTotalNodes()),
         record.rounds,
     )

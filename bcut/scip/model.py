@@ -17,7 +17,12 @@ from bcut.separation.driver import IntegerCut
 
 
 def build_model(
-    formulation: Formulation, objective: Objective, *, cuts: Sequence[IntegerCut] = (), name: str = "bcut"
+    formulation: Formulation,
+    objective: Objective,
+    *,
+    cuts: Sequence[IntegerCut] = (),
+    name: str = "bcut",
+    scale: float = 1.0,
 ) -> tuple[Model, list[Variable]]:
     """Build the SCIP model of a formulation.
 
@@ -26,8 +31,11 @@ def build_model(
     formulation : Formulation
     objective : Objective
     cuts : sequence of IntegerCut
-        Written as removable rows that the solver need not check, since the formulation implies them for 0/1 points.
+        Written as removable rows that the solver need not check, since the formulation implies them for 0/1
+        points.
     name : str
+    scale : float
+        What the model's objective is multiplied by.
 
     Returns
     -------
@@ -40,7 +48,7 @@ def build_model(
     model.hideOutput()
     variables = [
         model.addVar(name="x_" + "_".join(map(str, simplex)), vtype="B", obj=cost)
-        for simplex, cost in zip(formulation.simplices.tolist(), objective.costs.tolist(), strict=True)
+        for simplex, cost in zip(formulation.simplices.tolist(), (objective.costs * scale).tolist(), strict=True)
     ]
     if objective.sense == "max":
         model.setMaximize()

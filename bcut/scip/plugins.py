@@ -15,7 +15,8 @@ from bcut.bounds.root import Round
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut, Separation
 
-# The first relaxation of a node, and the last one after separation. GAPUPDATED is a mask over other types of events.
+# The first relaxation of a node, and the last one after separation. GAPUPDATED is a mask over other types of
+# events.
 _LP_EVENTS = (SCIP_EVENTTYPE.FIRSTLPSOLVED, SCIP_EVENTTYPE.LPSOLVED)
 
 
@@ -52,6 +53,7 @@ class RootRecord:
 
     def __init__(self, objective: Objective) -> None:
         self.costs = objective.costs
+        self.tolerance = 1e-9 * objective.largest_cost
         self.rounds: list[Round] = []
         self._started = time.perf_counter()
 
@@ -62,7 +64,7 @@ class RootRecord:
         """
         value = float(self.costs @ x)
         seconds = time.perf_counter() - self._started
-        if self.rounds and not self.rounds[-1].cuts and isclose(self.rounds[-1].lp, value, abs_tol=1e-9):
+        if self.rounds and not self.rounds[-1].cuts and isclose(self.rounds[-1].lp, value, abs_tol=self.tolerance):
             seconds += self.rounds.pop().seconds
         self.rounds.append(Round(value, cuts, seconds))
         self._started = time.perf_counter()
@@ -71,8 +73,8 @@ class RootRecord:
 class SeparatorAdapter(Sepa):
     """One SCIP separator that runs all of ours, one after the other, and records the rounds of the root.
 
-    What a separator raises would be swallowed by SCIP, so it is kept in `error`, the solve is interrupted, and
-    the host raises it afterwards.
+    What a separator raises would be swallowed by SCIP, so it is kept in `error`, the solve is interrupted,
+    and the host raises it afterwards.
 
     Parameters
     ----------
@@ -104,7 +106,8 @@ class SeparatorAdapter(Sepa):
 
     def sepaexeclp(self) -> dict[str, Any]:
         """Separate the LP solution of the current node."""
-        # After an error SCIP may ask once more before it notices the interrupt; the first error is the one to report.
+        # After an error SCIP may ask once more before it notices the interrupt; the first error is the one to
+        # report.
         if self.error is None:
             try:
                 return {"result": self._execute()}
@@ -161,9 +164,13 @@ class Observer(Eventhdlr):
     """Records the first and the last relaxation of the root, and reports progress."""
 
     def __init__(
-        self, values: LpValues, record: RootRecord, on_progress: Callable[[dict[str, Any]], None] | None
+        self,
+        values: LpValues,
+        record: RootRecord,
+        on_progress: Callable[[dict[str, Any]], None] | None,
+        scale: float,
     ) -> None:
-        self.values, self.record, self.on_progress = values, record, on_progress
+        self.values, self.record, self.on_progress, self.scale = values, record, on_progress, scale
         self.error: BaseException | None = None
 
     def eventinit(self) -> None:
@@ -198,8 +205,8 @@ class Observer(Eventhdlr):
         self.on_progress(
             {
                 "stage": "tree",
-                "value": None if abs(primal) >= infinity else primal,
-                "bound": None if abs(dual) >= infinity else dual,
+                "value": None if abs(primal) >= infinity else primal / self.scale,
+                "bound": None if abs(dual) >= infinity else dual / self.scale,
                 "nodes": model.getNTotalNodes(),
             }
         )

@@ -138,7 +138,7 @@ def _choose(method: str, search: Search) -> Callable[[Search], None]:
         return solve_in_scip
     objective = search.whole.objective
     # Solvers tell neighbouring integers apart only where values are not too large.
-    small = float(np.abs(objective.costs).max(initial=0.0)) <= LARGEST_TARGET_COST
+    small = objective.largest_cost <= LARGEST_TARGET_COST
     return solve_by_targets if objective.is_integral and small else solve_at_once
 
 

@@ -30,8 +30,8 @@ def export(
     ----------
     instance : str, path or PointConfiguration
     path : str or path
-        Ends in ".lp" or ".mps". The variable of a simplex is called ``x_v0_v1_..._vd``, a cocircuit row after its
-        (d-1)-simplex.
+        Ends in ".lp" or ".mps". The variable of a simplex is called ``x_v0_v1_..._vd``, a cocircuit row after
+        its (d-1)-simplex.
     objective, sense, formulation, spanning
         As for `bcut.solve`.
 

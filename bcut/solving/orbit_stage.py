@@ -80,7 +80,7 @@ class OrbitStage:
         return formulation, self.objective.restricted_to(orbit_of)
 
     def pulled(self) -> NDArray[np.int64] | None:
-        """Return a triangulation that takes no search, in any dimension; None where it misses points that it must use."""
+        """Return a triangulation that takes no search; None where it misses points that it must use."""
         simplices = pulling_triangulation(self.formulation.orbits.hull_facets, self.configuration.n)
         if self.formulation.spanning and len(np.unique(simplices)) < self.configuration.n:
             return None

@@ -177,8 +177,8 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     root : RootBound or None
         Of this part. Without it the separators start anew.
     cutoff : float, optional
-        Only triangulations strictly better than this are wanted. Without it the part is the whole, and the search starts
-        from the best triangulation so far.
+        Only triangulations strictly better than this are wanted. Without it the part is the whole, and the
+        search starts from the best triangulation so far.
     """
     from bcut.scip.host import TreeOptions, branch_and_cut
 
@@ -213,5 +213,6 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     if tree.bound is not None and cutoff is None:
         # Within SCIP's tolerance: a bound of 22.0000001 must not be rounded up to 23.
         bound = Fraction(search.sign * tree.bound)
-        search.raise_bound(bound - max(Fraction(1), abs(bound)) * Fraction(1, 10**6))
+        size = max(Fraction(search.whole.objective.largest_cost), abs(bound))
+        search.raise_bound(bound - size / 10**6)
     return tree.status

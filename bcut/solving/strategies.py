@@ -15,10 +15,11 @@ RELATIVE_GAP = 1e-9
 def solve_by_targets(search: Search) -> None:
     """Solve where every triangulation has an integral value.
 
-    The smallest value that the root bound allows is a target. Only columns whose reduced cost is at most target - bound
-    can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP searches what is left. Either some
-    triangulation reaches the target, and the best of those is optimal, or none does, and the target moves up: by one at
-    first, then in growing steps, since with large costs there may be many values below the optimum.
+    The smallest value that the root bound allows is a target. Only columns whose reduced cost is at most
+    target - bound can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP
+    searches what is left. Either some triangulation reaches the target, and the best of those is optimal, or
+    none does, and the target moves up: by one at first, then in growing steps, since with large costs there
+    may be many values below the optimum.
     """
     root = bound_at_root(search, search.whole, None)
     if root.first is None:
@@ -65,7 +66,8 @@ def _reach(
         return "reached" if search.sign * search.value <= target else "refuted"
     if search.seconds_left == 0.0:
         return "limit"
-    # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target + 1/2.
+    # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target +
+    # 1/2.
     status = branch(search, part, root, cutoff=float(search.sign * (target + Fraction(1, 2))))
     if status == "infeasible":
         return "refuted"
@@ -100,7 +102,8 @@ def _is_close(search: Search) -> bool:
     value, bound = search.value, search.bound
     if value is None or bound is None:
         return False
-    return float(search.sign * value - bound) <= RELATIVE_GAP * max(1.0, abs(float(value)))
+    size = max(search.whole.objective.largest_cost, abs(float(value)))
+    return float(search.sign * value - bound) <= RELATIVE_GAP * size
 
 
 def _finish(search: Search, status: str) -> None:

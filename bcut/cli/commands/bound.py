@@ -25,8 +25,8 @@ from bcut.cli.running import carry_out
 def bound(**options: Any) -> int:
     """Bound the optimum of INSTANCE at the root, before and after the cuts of the separators given.
 
-    There is no branching, and none of the solver's own cuts are used, so the difference is what the separators did. The
-    result has the same form as that of `bcut solve`, with no triangulation.
+    There is no branching, and none of the solver's own cuts are used, so the difference is what the
+    separators did. The result has the same form as that of `bcut solve`, with no triangulation.
     """
     from bcut.solving.api import bound as call
 

@@ -17,8 +17,8 @@ from bcut.cli.options import instance_argument, objective_options
 def export(instance: str, file: Path, **options: Any) -> int:
     """Write the integer program of INSTANCE to a file that other solvers read; the suffix tells the format.
 
-    INSTANCE is a file of points or a member of a family (`bcut generate --list`). The variable of a simplex is called
-    x_v0_v1_..._vd after its vertices.
+    INSTANCE is a file of points or a member of a family (`bcut generate --list`). The variable of a simplex
+    is called x_v0_v1_..._vd after its vertices.
     """
     from bcut.cli.running import check_output
     from bcut.solving.export import export as call

@@ -13,8 +13,8 @@ from bcut.cli.options import instance_argument, json_option
 def info(instance: str, as_json: bool) -> int:
     """Describe INSTANCE: its points, its convex hull, its candidate simplices and the size of its integer program.
 
-    INSTANCE is a file of points or a member of a family (`bcut generate --list`). Everything is computed, nothing is
-    looked up.
+    INSTANCE is a file of points or a member of a family (`bcut generate --list`). Everything is computed,
+    nothing is looked up.
     """
     from bcut.cli.output import emit, emit_json, table
     from bcut.solving.information import info as call

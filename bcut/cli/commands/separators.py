@@ -56,8 +56,9 @@ def list_command(as_json: bool) -> int:
 def check_command(separator: str, quiet: bool) -> int:
     """Check that no cut of a separator cuts off a triangulation, and that it keeps the other rules of the seam.
 
-    NAME|FILE is written as for `bcut solve --separator`, with parameters after a colon. Exit status 0: it passes; 5: it
-    does not, and the report names the triangulation that a cut cuts off, or shows the traceback of what it raised.
+    NAME|FILE is written as for `bcut solve --separator`, with parameters after a colon. Exit status 0: it
+    passes; 5: it does not, and the report names the triangulation that a cut cuts off, or shows the traceback
+    of what it raised.
     """
     from bcut.cli.output import emit
     from bcut.separation.check import check_separator

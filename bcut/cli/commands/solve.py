@@ -32,10 +32,10 @@ from bcut.cli.running import carry_out
 def solve(**options: Any) -> int:
     """Find an optimal triangulation of INSTANCE and prove it optimal.
 
-    INSTANCE is a file of points or a member of a family (`bcut generate --list`). The triangulation is verified exactly
-    before it is reported. Exit status 0: solved (or proven that there is no such triangulation); 3: a limit came first,
-    and what was found is still written; 5: a separator or the solver failed; 130: interrupted, with what was found
-    still written.
+    INSTANCE is a file of points or a member of a family (`bcut generate --list`). The triangulation is
+    verified exactly before it is reported. Exit status 0: solved (or proven that there is no such
+    triangulation); 3: a limit came first, and what was found is still written; 5: a separator or the solver
+    failed; 130: interrupted, with what was found still written.
     """
     from bcut.solving.api import solve as call
 

@@ -16,8 +16,8 @@ from bcut.cli.options import json_option
 def verify(result: Path, as_json: bool, quiet: bool) -> int:
     """Re-check the file RESULT exactly: triangulation, value, and the bound where it carries a certificate.
 
-    The check shares nothing with the model or the solvers that found the result. Exit status 0: the result holds; 2: it
-    is refused, and the message says why.
+    The check shares nothing with the model or the solvers that found the result. Exit status 0: the result
+    holds; 2: it is refused, and the message says why.
     """
     from bcut.cli.output import emit, emit_json
     from bcut.verification.verify import verify as call
