@@ -2,7 +2,8 @@
 
     python benchmarks/side_by_side.py
 
-Times are those of whole processes, the start of Python and its imports included. TOPCOM reads the points exactly as
+Times are those of whole processes, the start of Python and its imports included; ratios are of processor time, which
+other work on the machine disturbs least. TOPCOM reads the points exactly as
 `bcut generate --format dat` writes them: the doubles of the sphere as the rationals that they are. Where the points
 have affine symmetries, TOPCOM also runs with generators of their group; `bcut solve` is told of none.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import resource
 import shutil
 import statistics
 import subprocess
@@ -41,8 +43,8 @@ class Contestant:
     label : str
     command : list of str
     stdin : str
-    seconds : list of float
-        Wall-clock time of each run.
+    wall, processor : list of float
+        Seconds of each run: by the clock, and used by the process in user and system mode.
     value : int or None
         The number of simplices that the last run found.
     ended : bool
@@ -52,7 +54,8 @@ class Contestant:
     label: str
     command: list[str]
     stdin: str = ""
-    seconds: list[float] = field(default_factory=list)
+    wall: list[float] = field(default_factory=list)
+    processor: list[float] = field(default_factory=list)
     value: int | None = None
     ended: bool = False
 
@@ -61,23 +64,27 @@ class Contestant:
         with tempfile.TemporaryFile("w+") as stdin, tempfile.TemporaryFile("w+") as stdout:
             stdin.write(self.stdin)
             stdin.seek(0)
-            started = time.perf_counter()
-            with subprocess.Popen(self.command, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL) as process:
+            started, used = time.perf_counter(), _processor_time()
+            with subprocess.Popen(
+                self.command, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL
+            ) as process:
                 try:
                     process.wait(limit)
                 except subprocess.TimeoutExpired:
                     process.kill()
                     self.ended = True
-            self.seconds.append(time.perf_counter() - started)
+            self.wall.append(time.perf_counter() - started)
+            self.processor.append(_processor_time() - used)
             if not self.ended and process.returncode:
                 raise RuntimeError(f"{' '.join(self.command)} ended with status {process.returncode}")
             stdout.seek(0)
             self.value = _simplices(stdout.read())
 
-    @property
-    def median(self) -> float:
-        """Of the times of all runs."""
-        return statistics.median(self.seconds)
+
+def _processor_time() -> float:
+    """Return the processor time of all finished child processes."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _simplices(output: str) -> int | None:
@@ -105,32 +112,41 @@ def contestants(instance: str, topcom: str) -> list[Contestant]:
 
 
 def compare(instance: str, topcom: str, *, runs: int, limit: float) -> None:
-    """Run all commands in turn, several times, and print their medians and ratios."""
+    """Run all commands in turn, several times; print medians, and ratios of processor time to that of `bcut`."""
     entrants = contestants(instance, topcom)
     for _ in range(runs):
         for entrant in entrants:
             # A run that the limit ends says the same every time.
             if not entrant.ended:
                 entrant.run(limit)
-    first = entrants[0]
+    base = statistics.median(entrants[0].processor)
     for entrant in entrants:
         more = ">" if entrant.ended else ""
+        wall, processor = statistics.median(entrant.wall), statistics.median(entrant.processor)
         found = "nothing printed" if entrant.value is None else f"{entrant.value} simplices"
-        counted = f"{len(entrant.seconds)} run{'s' if len(entrant.seconds) > 1 else ''}"
-        ratio = "" if entrant is first else f", {more}{entrant.median / first.median:.3g} times as long as bcut"
-        print(f"{instance}: {entrant.label}: {more}{entrant.median:.2f} s (median of {counted}), {found}{ratio}")
+        print(
+            f"{instance}: {entrant.label}: {found}, {more}{wall:.2f} s, of the processor {more}{processor:.2f} s "
+            f"(medians of {len(entrant.wall)}), ratio {more}{processor / base:.3g}",
+            flush=True,
+        )
 
 
 def main() -> None:
     """Read the options and run the comparisons."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("instances", nargs="*", default=["cube:4", "sphere:16,3,seed=1"], help="what to compare on")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "instances", nargs="*", default=["cube:4", "sphere:16,3,seed=1"], help="what to compare on"
+    )
     parser.add_argument("--runs", type=int, default=5, help="runs of every command (default 5)")
     parser.add_argument("--time-limit", type=float, default=300, help="seconds per run (default 300)")
     options = parser.parse_args()
     topcom = next((path for name in PROGRAMS if (path := shutil.which(name))), None)
     if topcom is None:
-        sys.exit(f"TOPCOM is missing: none of {', '.join(PROGRAMS)} is on the path (Debian: apt install topcom)")
+        sys.exit(
+            f"TOPCOM is missing: none of {', '.join(PROGRAMS)} is on the path (Debian: apt install topcom)"
+        )
     print(f"# {Path(topcom).name}, at most {options.time_limit:g} s a run", flush=True)
     for instance in options.instances:
         compare(instance, topcom, runs=options.runs, limit=options.time_limit)

@@ -89,7 +89,7 @@ class Link(Separator):
             values = point.x[star.columns]
             shortfall, weights = most_violated_weights(star, values, self.programs)
             if shortfall > _SHORTFALL:
-                cut = self._cut(star, values, weights)
+                cut = self.cut_of(star, values, weights)
                 if cut is not None:
                     found.append((shortfall, cut))
         found.sort(key=lambda item: item[0], reverse=True)
@@ -116,7 +116,7 @@ class Link(Separator):
         passing = np.bincount(faces, weights=values * elsewhere, minlength=count)
         return np.flatnonzero(passing > _SHORTFALL).tolist()
 
-    def _cut(self, star: Star, values: NDArray[np.floating], weights: NDArray[np.floating]) -> Cut | None:
+    def cut_of(self, star: Star, values: NDArray[np.floating], weights: NDArray[np.floating]) -> Cut | None:
         """Make the exact cut: round, lift, and write alpha * y_e - w x <= 0 with few nonzero coefficients."""
         support = np.flatnonzero(values > _NOISE)
         integers = _to_integers(weights[support])

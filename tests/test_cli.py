@@ -431,6 +431,15 @@ def test_an_invalid_separator_fails_its_check_with_a_triangulation(tmp_path: Pat
     assert re.search(r"cuts off a triangulation, .*: \[\d+(, \d+)+\] \[", capsys.readouterr().out)
 
 
+def test_what_a_separator_prints_stays_off_standard_output(tmp_path: Path, capsys: Captured) -> None:
+    file = tmp_path / "talking.py"
+    file.write_text(INVALID.replace("        for", "        print('so many')\n        for").replace("yield", "0 and"))
+    assert run(["solve", "random:12,3,seed=1000", "--spanning", "--separator", str(file), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["value"] == 17
+    assert captured.err.startswith("so many\n")
+
+
 @pytest.mark.parametrize("method", ["auto", "scip"])
 def test_a_separator_that_raises_is_named_with_its_own_traceback(
     method: str, tmp_path: Path, capsys: Captured

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from math import comb
+from math import comb, gcd
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ def test_cardinality_counts_simplices(square: Formulation) -> None:
     objective = make_objective("cardinality", square)
     assert objective.value([0, 3]) == 2
     assert objective.costs.tolist() == [1.0] * 4
-    assert objective.is_integral
+    assert objective.unit == 1
 
 
 def test_senses_turn_the_sign(square: Formulation) -> None:
@@ -51,7 +51,7 @@ def test_random_costs_are_the_doubles_of_the_generator_by_colexicographic_rank()
         rank = comb(a, 1) + comb(b, 2) + comb(c, 3)
         assert objective.value([column]) == Fraction(drawn[rank])
         assert objective.costs[column] == drawn[rank]
-    assert not objective.is_integral
+    assert not objective.counts_units
 
 
 def test_random_costs_do_not_depend_on_which_simplices_are_candidates() -> None:
@@ -75,7 +75,6 @@ def test_costs_of_a_file_are_exact(square: Formulation, tmp_path: Path) -> None:
 def test_the_default_of_a_costs_file_is_one(square: Formulation, tmp_path: Path) -> None:
     objective = make_objective(write(tmp_path / "c.json", {"costs": [[[0, 1, 2], 5]]}), square)
     assert objective.numerators.tolist() == [5, 1, 1, 1]
-    assert objective.is_integral
 
 
 def test_costs_of_simplices_that_are_no_candidates_are_ignored(tmp_path: Path) -> None:
@@ -115,6 +114,8 @@ BAD_COSTS = [
     ('{"costs": [[[0, 1, 2], 1e999]]}', r"c\.json: entry 0: a cost is"),
     ({"costs": [[[0, 1, 2], "1e999"]]}, r"c\.json: entry 0: a cost is"),
     ({"costs": [[[0, 1, 2], "1e999999999"]]}, r"c\.json: entry 0: a cost is"),
+    ({"costs": [[[0, 1, 2], "1e-400"]]}, r"c\.json: entry 0: a cost is"),
+    ({"costs": [[[0, 1, 2], "1e-999999999"]]}, r"c\.json: entry 0: a cost is"),
     ({"costs": [[[0, 1, 2], "1" + "0" * 400]]}, r"c\.json: entry 0: a cost is .*\.\.\.$"),
     ('{"costs": [[[0, 1, 2], ' + "1" * 5000 + "]]}", r"c\.json: cannot be read"),
     ("[" * 200_000, r"c\.json"),
@@ -168,7 +169,6 @@ def test_values_are_exact_sums(costs: list[Fraction], data: st.DataObject) -> No
     objective = from_fractions("x", "min", costs)
     chosen = data.draw(st.lists(st.integers(0, len(costs) - 1), unique=True))
     assert objective.value(chosen) == sum(costs[i] for i in chosen)
-    assert objective.is_integral == all(cost.denominator == 1 for cost in costs)
     assert objective.costs.tolist() == [float(cost) for cost in costs]
     part = objective.restricted_to(np.array(chosen, dtype=np.int64))
     assert part.value(range(len(chosen))) == objective.value(chosen)
@@ -186,6 +186,40 @@ def test_only_small_numerators_are_kept_in_64_bits(costs: list[Any], fits: bool)
 def test_costs_beyond_64_bits_are_summed_exactly() -> None:
     objective = from_fractions("x", "max", [Fraction(10**300), Fraction(1), Fraction(-(10**300))])
     assert objective.value([0, 1, 2]) == 1
+
+
+@given(st.lists(st.fractions(-9, 9, max_denominator=12), min_size=1, max_size=8), st.fractions())
+def test_every_value_is_a_multiple_of_the_unit(costs: list[Fraction], bound: Fraction) -> None:
+    objective = from_fractions("x", "min", costs)
+    multiples = [cost / objective.unit for cost in costs]
+    assert all(multiple.denominator == 1 for multiple in multiples)
+    assert gcd(*(int(multiple) for multiple in multiples)) in (0, 1)
+    rounded = objective.rounded_up(bound)
+    assert bound <= rounded < bound + objective.unit
+    assert (rounded / objective.unit).denominator == 1
+    assert objective.counts_units
+    assert objective.solver_unit == objective.unit
+    assert objective.solver_costs.tolist() == [float(multiple) for multiple in multiples]
+
+
+@pytest.mark.parametrize(
+    ("costs", "counts"),
+    [
+        ([0, 0], True),
+        ([10**6, 1], True),
+        ([10**6 + 1, 1], False),
+        ([10**30, 3 * 10**30], True),
+        ([Fraction(1, 10**30), Fraction(1, 10**30)], True),
+        ([Fraction(1, 10**30), Fraction(1, 10**20)], False),
+        ([10**300, 1], False),
+    ],
+)
+def test_solvers_see_costs_of_ordinary_size(costs: list[Any], counts: bool) -> None:
+    objective = from_fractions("x", "min", [Fraction(cost) for cost in costs])
+    assert objective.counts_units is counts
+    assert np.abs(objective.solver_costs).max() <= (10**6 if counts else 1)
+    restored = objective.solver_costs * float(objective.solver_unit)
+    assert restored.tolist() == pytest.approx([float(cost) for cost in costs], rel=1e-15)
 
 
 def test_read_costs_returns_the_default_and_the_table(tmp_path: Path) -> None:

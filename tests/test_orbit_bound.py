@@ -266,7 +266,7 @@ def test_linear_programs_without_points_are_recognised() -> None:
     matrix = sp.csr_matrix(np.array([[1.0, 1.0], [1.0, 1.0]]))
     for method in ("simplex", "interior"):
         found = solve_linear_program(
-            LinearProgram(np.ones(2), matrix, np.array([1.0, 2.0])),
+            LinearProgram(np.ones(2), matrix, np.array([1.0, 2.0]), np.array([1.0, 2.0])),
             method="interior" if method == "interior" else "simplex",
         )
         assert found.status == "infeasible"

@@ -10,6 +10,8 @@ import pytest
 
 import bcut
 from bcut.cli.main import run
+from bcut.separation.cases import CASES
+from bcut.separation.resolve import resolve
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -67,11 +69,12 @@ def test_the_separator_passes_its_check_and_runs(elsewhere: Path, capsys: Captur
     code = blocks("python")[1]
     assert len(code_lines(code)) <= 15
     (elsewhere / "triples.py").write_text(code)
-    assert run(["separators", "check", "./triples.py"]) == 0
-    assert run(["solve", "moae", "--separator", "./triples.py"]) == 0
-    assert "triples: " in capsys.readouterr().out
-    result = bcut.bound("random:12,3,seed=1000", spanning=True, separators=["./triples.py"])
-    assert result.separators["triples"]["calls"] >= 1
+    report = bcut.check_separator(lambda: resolve("./triples.py"), CASES[::3])
+    assert report.ok, report.summary
+    assert report.violated
+    (command,) = re.findall(r"`bcut (solve [^`]*--separator [^`]*)`", README)
+    assert run(command.split()) == 0
+    assert re.search(r"triples: [1-9]\d* calls", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

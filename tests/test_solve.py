@@ -228,10 +228,15 @@ def test_targets_grow_until_one_is_reached(monkeypatch: pytest.MonkeyPatch, tmp_
         return reach(search, part, target)
 
     monkeypatch.setattr(strategies, "_reach", recording)
+    # Costs of 50000 units each, but for one that is never used.
     costs = [int(cost) * 50_000 for cost in objective.numerators]
+    unused = next(j for j, cost in enumerate(costs) if cost == 150_000)
+    costs[unused] += 1
     text = costs_file(tmp_path, formulation.configuration, costs, spanning=True)
     result = bcut.solve(formulation.configuration, objective=text, spanning=True, separators=[])
-    assert_solved(result, optimum * 50_000)
+    best = (incidence(formulation) @ np.array(costs)).min()
+    assert best == optimum * 50_000
+    assert_solved(result, best)
     assert 1 < len(targets) < 15
     assert targets == sorted(targets)
 

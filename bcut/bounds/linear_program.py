@@ -19,18 +19,20 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LinearProgram:
-    """Minimise ``costs @ x`` over ``matrix @ x = right``, x >= 0.
+    """Minimise ``costs @ x`` over ``lower <= matrix @ x <= upper``, x >= 0.
 
     Attributes
     ----------
     costs : ndarray of float, shape (m,)
     matrix : scipy.sparse.csr_matrix, shape (rows, m)
-    right : ndarray of float, shape (rows,)
+    lower, upper : ndarray of float, shape (rows,)
+        Infinite where a row has no such side.
     """
 
     costs: NDArray[np.float64]
     matrix: sp.csr_matrix
-    right: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,7 @@ def solve_linear_program(
     model.num_col_, model.num_row_ = columns, rows
     model.col_cost_ = program.costs
     model.col_lower_, model.col_upper_ = np.zeros(columns), np.full(columns, np.inf)
-    model.row_lower_ = model.row_upper_ = program.right
+    model.row_lower_, model.row_upper_ = program.lower, program.upper
     matrix = program.matrix.tocsr()
     model.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
     model.a_matrix_.start_ = matrix.indptr

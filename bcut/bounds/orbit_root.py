@@ -5,16 +5,17 @@ For multipliers y of the cocircuit rows and z of the coverage row, every triangu
     sign * objective  >=  z * volume + sum over orbits o of |o| * min(0, r_o),
     r_o = sign * c_o - z * volume_o - y M_o,
 
-since 0 <= X_o <= |o|. Floating-point duals are rounded to fractions over one denominator, and everything is computed
-again from these integers. Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long;
-so z is lowered until no r_o is negative, where that is possible (all volumes are positive) and gains something.
+since 0 <= X_o <= |o|; cuts ``a X <= 0`` take part with multipliers that are not positive. Floating-point
+duals are rounded to fractions over one denominator, and everything is computed again from these integers.
+Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long; so z is lowered
+until no r_o is negative, where that is possible (all volumes are positive) and gains something.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ from numpy.typing import NDArray
 from bcut.bounds.linear_program import LinearProgram, solve_linear_program
 from bcut.formulations.orbit_cocircuits import OrbitFormulation
 from bcut.objectives.objective import Objective
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
 
 # Multipliers are multiples of 2**-SHIFT, or of less where 64 bits do not suffice otherwise.
 SHIFT = 45
@@ -37,8 +41,8 @@ class OrbitBound:
     ----------
     value : Fraction
         No triangulation has ``sign * objective`` below it.
-    multipliers : ndarray of int64 or of Python integers, shape (rows,)
-        Of the cocircuit rows, over `denominator`.
+    multipliers : ndarray of int64 or of Python integers, shape (rows + cuts,)
+        Of the cocircuit rows and of the cuts, over `denominator`; those of cuts are not positive.
     coverage : int
         Multiplier of the volume row, over `denominator`.
     reduced_costs : ndarray of int64 or of Python integers, shape (m,)
@@ -109,7 +113,9 @@ def orbit_root(
         "optimal",
         objective.sign * solution.value,
         solution.x,
-        safe_orbit_bound(formulation, objective, solution.duals[1:], float(solution.duals[0])),
+        safe_orbit_bound(
+            formulation, objective, _unscaled(formulation, solution.duals[1:]), float(solution.duals[0])
+        ),
     )
 
 
@@ -124,10 +130,23 @@ def _program(formulation: OrbitFormulation, objective: Objective) -> LinearProgr
     shares = np.true_divide(formulation.volumes, formulation.volume).astype(float)
     # Rows with entries around 1 suit the solver best.
     scale = float(np.abs(shares).max())
-    matrix = sp.vstack((sp.csr_matrix(shares / scale), formulation.matrix.astype(float)), format="csr")
-    right = np.zeros(matrix.shape[0])
-    right[0] = 1 / scale
-    return LinearProgram(objective.sign * objective.costs, matrix, right)
+    blocks = [sp.csr_matrix(shares / scale), formulation.matrix.astype(float)]
+    if formulation.cuts is not None:
+        largest = abs(formulation.cuts).max(axis=1).toarray().reshape(-1)
+        blocks.append(sp.diags_array(1 / largest) @ formulation.cuts)
+    matrix = sp.vstack(blocks, format="csr")
+    lower, upper = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[0])
+    lower[0] = upper[0] = 1 / scale
+    lower[1 + formulation.matrix.shape[0] :] = -np.inf
+    return LinearProgram(objective.sign * objective.costs, matrix, lower, upper)
+
+
+def _unscaled(formulation: OrbitFormulation, duals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the duals of the rows as they are, from those of `_program`, whose cuts have entries of size 1."""
+    if formulation.cuts is None:
+        return duals
+    largest = abs(formulation.cuts).max(axis=1).toarray().reshape(-1)
+    return np.concatenate((duals[: -len(largest)], duals[-len(largest) :] / largest))
 
 
 def safe_orbit_bound(
@@ -139,7 +158,7 @@ def safe_orbit_bound(
     ----------
     formulation : OrbitFormulation
     objective : Objective
-    duals : ndarray of float, shape (rows,)
+    duals : ndarray of float, shape (rows + cuts,)
         Any numbers; good ones give good bounds. For the minimisation of ``sign * objective``.
     coverage : float
         Multiplier of the coverage row, if that row were divided by the largest of its entries' sizes.
@@ -151,12 +170,14 @@ def safe_orbit_bound(
     denominator = (1 << shift) * (1 if small else abs(volume))
     unit = denominator >> shift
     multipliers = np.rint(np.nan_to_num(duals) * 2.0**shift).astype(np.int64)
+    rows = formulation.matrix.shape[0]
+    multipliers[rows:] = np.minimum(multipliers[rows:], 0)
     share = Fraction(float(np.nan_to_num(coverage))) * denominator / largest
     cover = round(share)
     if small and objective.fits_64_bits:
-        reduced = _costs(objective, denominator) - formulation.matrix.T.astype(np.int64) @ multipliers
+        reduced = _costs(objective, denominator) - _columns(formulation).T @ multipliers
     else:
-        products = formulation.matrix.T.astype(np.int64) @ multipliers
+        products = _columns(formulation).T @ multipliers
         multipliers = multipliers.astype(object) * unit
         reduced = _costs(objective, denominator).astype(object) - products.astype(object) * unit
     bounds = [_with_coverage(formulation, reduced, cover)]
@@ -165,6 +186,14 @@ def safe_orbit_bound(
         bounds.append(_with_coverage(formulation, reduced, cover - lowered))
     total, left, chosen = max(bounds, key=lambda bound: bound[0])
     return OrbitBound(Fraction(total, denominator), multipliers, chosen, left, denominator)
+
+
+def _columns(formulation: OrbitFormulation) -> sp.csr_matrix:
+    """Return the cocircuit rows and the cuts."""
+    import scipy.sparse as sp
+
+    matrix = formulation.matrix.astype(np.int64)
+    return matrix if formulation.cuts is None else sp.vstack((matrix, formulation.cuts), format="csr")
 
 
 def _with_coverage(
@@ -202,11 +231,9 @@ def _shift(
     formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
 ) -> int:
     """Return the largest shift up to `SHIFT` for which a reduced cost stays below 2**61."""
-    entries = (
-        float(abs(formulation.matrix).astype(np.int64).sum(axis=0).max()) if formulation.matrix.nnz else 0.0
-    )
+    sizes = np.abs(np.nan_to_num(duals))
     size = float(np.abs(objective.costs).max(initial=1.0)) + 2 * abs(float(np.nan_to_num(coverage)))
-    size += entries * float(np.abs(np.nan_to_num(duals)).max(initial=0.0))
+    size += float((abs(_columns(formulation)).T @ sizes).max(initial=0.0)) + float(sizes.max(initial=0.0))
     shift = SHIFT
     while shift > 0 and size * 2.0**shift >= 2.0**61:
         shift -= 1

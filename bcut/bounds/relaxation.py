@@ -61,8 +61,8 @@ class Relaxation:
         self.objective = objective
         self.deadline = deadline
         self.cuts: list[IntegerCut] = []
-        self._scale = objective.scale
-        self._costs = objective.sign * objective.costs * self._scale
+        self._unit = float(objective.solver_unit)
+        self._costs = objective.sign * objective.solver_costs
         self._solver = self._load()
 
     def _load(self) -> Any:
@@ -174,8 +174,8 @@ class Relaxation:
         base = self.formulation.matrix.shape[0]
         activity = np.array(solution.row_value)[base:]
         slack = np.array([cut.rhs for cut in self.cuts]) - activity
-        value = self.objective.sign * float(self._costs @ x) / self._scale
-        return RelaxationPoint(x, value, np.array(solution.row_dual) / self._scale, slack)
+        value = self.objective.sign * float(self._costs @ x) * self._unit
+        return RelaxationPoint(x, value, np.array(solution.row_dual) * self._unit, slack)
 
     def _run(self) -> Any:
         """Run HiGHS within the deadline; return the model status."""

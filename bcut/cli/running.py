@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +41,8 @@ def carry_out(
         raise click.UsageError("--separator and --no-separators contradict each other; drop one of them")
     check_output(output, instance)
     separators = [] if no_separators else list(separator) or None
-    with progress_line(quiet=quiet) as on_progress:
+    # Standard output is for the result; what a separator prints is for its author.
+    with redirect_stdout(sys.stderr), progress_line(quiet=quiet) as on_progress:
         result = call(instance, separators=separators, on_progress=on_progress, **options)
     if output is not None:
         result.save(output)

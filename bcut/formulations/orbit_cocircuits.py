@@ -23,7 +23,7 @@ make c = 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import gcd
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +66,8 @@ class OrbitFormulation:
         One coefficient of the volumes of the representatives, up to a common factor.
     volume : int
         The same of the hull; positive.
+    cuts : scipy.sparse.csr_matrix of int64, shape (cuts, m), or None
+        Valid inequalities ``cuts @ X <= 0``.
     """
 
     configuration: PointConfiguration
@@ -77,11 +79,16 @@ class OrbitFormulation:
     row_faces: NDArray[np.int64]
     volumes: NDArray[Any]
     volume: int
+    cuts: sp.csr_matrix | None = None
 
     @property
     def size(self) -> tuple[int, int]:
-        """Numbers of columns and rows, the coverage row included."""
+        """Numbers of columns and rows, the coverage row included, cuts not."""
         return len(self.simplices), self.matrix.shape[0] + 1
+
+    def with_cuts(self, cuts: sp.csr_matrix) -> OrbitFormulation:
+        """Return the same program with these cuts and no others."""
+        return replace(self, cuts=cuts)
 
     def expanded(
         self, orbits: Sequence[int] | NDArray[np.integer]

@@ -114,7 +114,7 @@ class Chirotope:
     @cached_property
     def facet_is_interior(self) -> NDArray[np.bool_]:
         """Whether each d-subset spans a (d-1)-simplex that lies in no facet of the convex hull, shape (C(n, d),)."""
-        return (self.sides > 0).any(axis=1) & (self.sides < 0).any(axis=1)
+        return (self.sides.max(axis=1) > 0) & (self.sides.min(axis=1) < 0)
 
     @cached_property
     def hull_facets(self) -> tuple[tuple[int, ...], ...]:

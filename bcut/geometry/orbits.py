@@ -94,10 +94,7 @@ def simplex_orbits(configuration: PointConfiguration, group: PermutationGroup) -
     """
     d = configuration.dimension
     forms = CanonicalForms(group)
-    sets = forms.roots[:, None]
-    span = _Span.of(configuration)
-    for _ in range(d - 1):
-        sets = _extended(forms, sets, span)[0]
+    sets = subset_orbits(configuration, forms, d)
     # Dependent sets that nothing has excluded so far have no point on either side.
     sides = facet_sides(configuration, sets)
     independent = sides.any(axis=1)
@@ -115,6 +112,18 @@ def simplex_orbits(configuration: PointConfiguration, group: PermutationGroup) -
         simplices,
         order // stabilisers,
     )
+
+
+def subset_orbits(configuration: PointConfiguration, forms: CanonicalForms, size: int) -> NDArray[np.int64]:
+    """Return representatives of the orbits of the affinely independent sets of `size` points, shape (m, size).
+
+    Of configurations with irrational or large coordinates, dependent sets may be among them.
+    """
+    sets = forms.roots[:, None]
+    span = _Span.of(configuration)
+    for _ in range(size - 1):
+        sets = _extended(forms, sets, span)[0]
+    return sets
 
 
 def facet_sides(configuration: PointConfiguration, facets: NDArray[np.int64]) -> NDArray[np.int8]:

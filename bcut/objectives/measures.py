@@ -13,6 +13,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from math import comb
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
 import numpy as np
@@ -126,8 +127,9 @@ def _cost(value: Any, path: Path, where: str) -> Fraction:
             raise OverflowError
         if isinstance(value, int | float | str) and not isinstance(value, bool):
             exact = Fraction(value)
-            float(exact)  # solvers work with doubles: a cost beyond their range is refused here
-            return exact
+            # Solvers work with doubles: a cost beyond their range is refused here.
+            if not exact or abs(float(exact)) >= float_info.min:
+                return exact
     except (ValueError, ZeroDivisionError, OverflowError):
         pass
     shown = json.dumps(value)

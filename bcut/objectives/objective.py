@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from math import frexp, lcm
+from math import ceil, frexp, lcm
 from typing import Literal, Protocol
 
 import numpy as np
@@ -20,6 +20,9 @@ Sense = Literal["min", "max"]
 
 # Integer costs up to this size keep all exact bound computations within 64 bits.
 _MAX_NUMERATOR = 1 << 40
+
+# Costs of more units than this leave solvers no room for their tolerances.
+_MAX_UNITS = 10**6
 
 
 class Candidates(Protocol):
@@ -71,16 +74,31 @@ class Objective:
         """The largest absolute value of a cost; 1 where all are zero: what differences are to be compared with."""
         return float(np.abs(self.costs).max(initial=0.0)) or 1.0
 
-    @property
-    def scale(self) -> float:
-        """A power of two that brings costs of unusual size near 1, where solvers' absolute tolerances make sense."""
-        exponent = frexp(self.largest_cost)[1]
-        return 1.0 if -10 <= exponent <= 20 else 2.0**-exponent
+    @cached_property
+    def unit(self) -> Fraction:
+        """The largest number of which every cost, and so every value, is an integral multiple; 1 where all are zero."""
+        return Fraction(int(np.gcd.reduce(self.numerators)) or 1, self.denominator)
 
     @property
-    def is_integral(self) -> bool:
-        """Whether every triangulation has an integral value, so that bounds may be rounded."""
-        return self.denominator == 1
+    def counts_units(self) -> bool:
+        """Whether costs are small multiples of `unit`, so that a solver can tell neighbouring values apart."""
+        return self.largest_cost <= _MAX_UNITS * self.unit
+
+    def rounded_up(self, bound: Fraction) -> Fraction:
+        """Round a bound on ``sign * objective`` up to the next value that a triangulation can have."""
+        return ceil(bound / self.unit) * self.unit
+
+    @cached_property
+    def solver_unit(self) -> Fraction:
+        """What solvers count costs in, as their tolerances are absolute: `unit`, or a power of two near the largest."""
+        return self.unit if self.counts_units else Fraction(2) ** frexp(self.largest_cost)[1]
+
+    @cached_property
+    def solver_costs(self) -> NDArray[np.float64]:
+        """The costs in units of `solver_unit`: exact integers where `counts_units`, at most 1 in size elsewhere."""
+        if self.counts_units:
+            return np.rint(self.costs / float(self.unit))
+        return np.ldexp(self.costs, -frexp(self.largest_cost)[1])
 
     @property
     def fits_64_bits(self) -> bool:

@@ -127,16 +127,16 @@ def branch_and_cut(
     """
     options = options or TreeOptions()
     started = time.perf_counter()
-    scale = objective.scale
+    unit = float(objective.solver_unit)
     model, variables = build_model(
-        formulation, objective, cuts=cuts, name=formulation.configuration.name, scale=scale
+        formulation, objective, cuts=cuts, name=formulation.configuration.name, costs=objective.solver_costs
     )
     _set_parameters(model, options)
-    _set_limits(model, options, time.perf_counter() - started, scale)
+    _set_limits(model, options, time.perf_counter() - started, unit)
     values = LpValues(variables)
     record = RootRecord(objective)
     adapter = _include_adapter(model, separation, values, record, options)
-    observer = Observer(values, record, on_progress, scale)
+    observer = Observer(values, record, on_progress, unit)
     model.includeEventhdlr(observer, "bcut-observer", "records root bounds and reports progress")
     if start is not None:
         _add_start(model, variables, start)
@@ -146,7 +146,7 @@ def branch_and_cut(
         raise captured
     if error is not None:
         raise SolverError(f"SCIP failed on {formulation.configuration.name}: {error}") from error
-    result = _collect(model, variables, record, scale)
+    result = _collect(model, variables, record, unit)
     result.seconds = time.perf_counter() - started
     model.freeProb()
     return result
@@ -172,13 +172,13 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
         model.setHeuristics(SCIP_PARAMSETTING.OFF)
 
 
-def _set_limits(model: Model, options: TreeOptions, elapsed: float, scale: float) -> None:
+def _set_limits(model: Model, options: TreeOptions, elapsed: float, unit: float) -> None:
     if options.seconds is not None:
         model.setParam("limits/time", min(max(0.0, options.seconds - elapsed), _LONGEST))
     if options.nodes is not None:
         model.setParam("limits/totalnodes", options.nodes)
     if options.cutoff is not None:
-        model.setObjlimit(options.cutoff * scale)
+        model.setObjlimit(options.cutoff / unit)
 
 
 def _include_adapter(
@@ -223,7 +223,7 @@ def _optimize(model: Model) -> Exception | None:
     return None
 
 
-def _collect(model: Model, variables: list[Variable], record: RootRecord, scale: float) -> TreeResult:
+def _collect(model: Model, variables: list[Variable], record: RootRecord, unit: float) -> TreeResult:
     status = model.getStatus()
     columns = None
     if model.getNSols() > 0:
@@ -245,7 +245,7 @@ def _collect(model: Model, variables: list[Variable], record: RootRecord, scale:
     return TreeResult(
         outcome,
         columns,
-        None if abs(bound) >= model.infinity() else float(bound) / scale,
+        None if abs(bound) >= model.infinity() else float(bound) * unit,
         int(model.getNTotalNodes()),
         record.rounds,
     )

@@ -22,7 +22,7 @@ def build_model(
     *,
     cuts: Sequence[IntegerCut] = (),
     name: str = "bcut",
-    scale: float = 1.0,
+    costs: NDArray[np.float64] | None = None,
 ) -> tuple[Model, list[Variable]]:
     """Build the SCIP model of a formulation.
 
@@ -34,8 +34,8 @@ def build_model(
         Written as removable rows that the solver need not check, since the formulation implies them for 0/1
         points.
     name : str
-    scale : float
-        What the model's objective is multiplied by.
+    costs : ndarray of float, shape (m,), optional
+        To write into the model instead of ``objective.costs``.
 
     Returns
     -------
@@ -46,9 +46,10 @@ def build_model(
     """
     model = Model(name)
     model.hideOutput()
+    entries = objective.costs if costs is None else costs
     variables = [
         model.addVar(name="x_" + "_".join(map(str, simplex)), vtype="B", obj=cost)
-        for simplex, cost in zip(formulation.simplices.tolist(), (objective.costs * scale).tolist(), strict=True)
+        for simplex, cost in zip(formulation.simplices.tolist(), entries.tolist(), strict=True)
     ]
     if objective.sense == "max":
         model.setMaximize()

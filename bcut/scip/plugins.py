@@ -168,9 +168,9 @@ class Observer(Eventhdlr):
         values: LpValues,
         record: RootRecord,
         on_progress: Callable[[dict[str, Any]], None] | None,
-        scale: float,
+        unit: float,
     ) -> None:
-        self.values, self.record, self.on_progress, self.scale = values, record, on_progress, scale
+        self.values, self.record, self.on_progress, self.unit = values, record, on_progress, unit
         self.error: BaseException | None = None
 
     def eventinit(self) -> None:
@@ -205,8 +205,8 @@ class Observer(Eventhdlr):
         self.on_progress(
             {
                 "stage": "tree",
-                "value": None if abs(primal) >= infinity else primal / self.scale,
-                "bound": None if abs(dual) >= infinity else dual / self.scale,
+                "value": None if abs(primal) >= infinity else primal * self.unit,
+                "bound": None if abs(dual) >= infinity else dual * self.unit,
                 "nodes": model.getNTotalNodes(),
             }
         )

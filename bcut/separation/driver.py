@@ -46,7 +46,8 @@ class IntegerCut:
             New column of each old one, -1 for those that were fixed.
         """
         kept = place[self.columns] >= 0
-        return replace(self, columns=place[self.columns[kept]], coefficients=self.coefficients[kept])
+        columns = place[self.columns[kept]].astype(np.int64)
+        return replace(self, columns=columns, coefficients=self.coefficients[kept])
 
     def violation(self, x: NDArray[np.floating]) -> float:
         """Return by how much x violates the cut (negative when it satisfies it)."""

@@ -20,19 +20,18 @@ from bcut.formulations.formulation import Formulation
 from bcut.geometry.configuration import PointConfiguration
 from bcut.instance import load_instance
 from bcut.objectives.measures import read_costs
-from bcut.objectives.objective import Objective, make_objective
+from bcut.objectives.objective import make_objective
 from bcut.result import Certificate, Instance, Question, Result, Root, RoundRecord, Size
 from bcut.separation.driver import check_names
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Separator
-from bcut.solving.certificates import make_certificate, rounded
+from bcut.solving.certificates import make_certificate
 from bcut.solving.search import Part, Progress, Search, bound_at_root, place
 from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_scip
 
 DEFAULT_SEPARATORS = ("link",)
 FORMULATIONS: dict[str, Callable[..., Formulation]] = {"2": cocircuit_formulation}
 METHODS = ("auto", "scip")
-LARGEST_TARGET_COST = 1e6
 
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
@@ -136,10 +135,7 @@ def bound(
 def _choose(method: str, search: Search) -> Callable[[Search], None]:
     if method == "scip":
         return solve_in_scip
-    objective = search.whole.objective
-    # Solvers tell neighbouring integers apart only where values are not too large.
-    small = objective.largest_cost <= LARGEST_TARGET_COST
-    return solve_by_targets if objective.is_integral and small else solve_at_once
+    return solve_by_targets if search.whole.objective.counts_units else solve_at_once
 
 
 class _Run:
@@ -197,7 +193,7 @@ class _Run:
                 self._verify(triangulation)
         search.seconds["total"] = time.perf_counter() - self.started
         sign = search.sign
-        proven = None if search.bound is None else sign * rounded(self.objective, search.bound)
+        proven = None if search.bound is None else sign * self.objective.rounded_up(search.bound)
         return Result(
             instance=_describe_instance(self.configuration),
             problem=self.question,

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-from math import ceil
-
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.result import Certificate
-
-
-def rounded(objective: Objective, bound: Fraction) -> Fraction:
-    """Round a bound on ``sign * objective`` up where every triangulation has an integral value."""
-    return Fraction(ceil(bound)) if objective.is_integral else bound
 
 
 def make_certificate(formulation: Formulation, objective: Objective, bound: SafeBound) -> Certificate:

@@ -5,12 +5,14 @@ Nothing here lists all simplices: it is the way to instances that are far too la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bcut.bounds.orbit_cuts import orbit_root_with_cuts
 from bcut.bounds.orbit_root import OrbitRoot, orbit_root
 from bcut.errors import TooLargeError
 from bcut.formulations.formulation import Formulation
@@ -54,6 +56,21 @@ class OrbitStage:
         """Count the simplices that a triangulation with ``sign * objective <= target`` may use."""
         assert self.root.bound is not None
         return int(self.formulation.sizes[self.root.bound.orbits_within(target)].sum())
+
+    def with_link_cuts(self, *, rounds: int = 200, seconds: Callable[[], float] | None = None) -> OrbitStage:
+        """Return the same stage after a cutting-plane loop with averaged link cuts.
+
+        Parameters
+        ----------
+        rounds : int
+            Relaxations with cuts, at most.
+        seconds : callable, optional
+            Returns the seconds that are left.
+        """
+        found = orbit_root_with_cuts(self.formulation, self.objective, rounds=rounds, seconds=seconds)
+        if found.root.bound is None or self.root.bound is None or found.root.bound.value <= self.root.bound.value:
+            return self
+        return replace(self, formulation=found.formulation, root=found.root)
 
     def residual(self, target: Fraction, *, limit: int = MAX_COLUMNS) -> tuple[Formulation, Objective]:
         """Write down the program on the simplices that a triangulation within the target may use.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from math import ceil
 from typing import Literal
 
 from bcut.solving.search import Part, Search, bound_at_root, branch, place
@@ -13,31 +12,33 @@ RELATIVE_GAP = 1e-9
 
 
 def solve_by_targets(search: Search) -> None:
-    """Solve where every triangulation has an integral value.
+    """Solve where costs, and so the values of triangulations, are small multiples of a unit, such as 1.
 
     The smallest value that the root bound allows is a target. Only columns whose reduced cost is at most
     target - bound can be in a triangulation that reaches it; on those the relaxation is cut, and SCIP
     searches what is left. Either some triangulation reaches the target, and the best of those is optimal, or
-    none does, and the target moves up: by one at first, then in growing steps, since with large costs there
+    none does, and the target moves up: by one unit at first, then in growing steps, since with large costs there
     may be many values below the optimum.
     """
     root = bound_at_root(search, search.whole, None)
     if root.first is None:
         return
     search.exact = root.first
-    search.raise_bound(Fraction(ceil(root.first.value)))
+    objective = search.whole.objective
+    unit = objective.unit
+    search.raise_bound(objective.rounded_up(root.first.value))
     refuted = 0
     while not _is_optimal(search):
         assert search.bound is not None
-        step = max(1, abs(search.bound) // 1000) << max(0, refuted - 1)
-        target = search.bound + step - 1
+        step = max(1, abs(search.bound) // (1000 * unit)) << max(0, refuted - 1)
+        target = search.bound + (step - 1) * unit
         if search.value is not None:
-            target = min(target, search.sign * search.value - 1)
+            target = min(target, search.sign * search.value - unit)
         columns = search.exact.columns_within(target)
         outcome = _reach(search, search.whole.restricted_to(columns), target)
         if outcome == "refuted":
             refuted += 1
-            search.raise_bound(target + 1)
+            search.raise_bound(target + unit)
         elif outcome == "reached":
             assert search.value is not None
             search.raise_bound(search.sign * search.value)
@@ -60,15 +61,18 @@ def _reach(
     search.columns_after_fixing = len(root.columns)
     if root.status in ("infeasible", "target"):
         return "refuted"
-    if root.status == "integral":
-        # An optimum of the part: if it misses the target, no triangulation reaches it.
-        assert search.value is not None
-        return "reached" if search.sign * search.value <= target else "refuted"
+    objective = search.whole.objective
+    if root.status == "integral" and root.last is not None and search.value is not None:
+        # An optimum of the part, up to the accuracy of the relaxation; the exact bound decides whether it is.
+        value, proven = search.sign * search.value, objective.rounded_up(root.last.value)
+        if value <= min(target, proven):
+            return "reached"
+        if proven > target:
+            return "refuted"
     if search.seconds_left == 0.0:
         return "limit"
-    # SCIP keeps solutions strictly better than the cutoff; no other value lies between target and target +
-    # 1/2.
-    status = branch(search, part, root, cutoff=float(search.sign * (target + Fraction(1, 2))))
+    # SCIP keeps solutions strictly better than the cutoff; no other value lies within half a unit of the target.
+    status = branch(search, part, root, cutoff=float(search.sign * (target + objective.unit / 2)))
     if status == "infeasible":
         return "refuted"
     if status == "optimal" or _is_optimal(search):
