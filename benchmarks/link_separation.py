@@ -90,7 +90,9 @@ def main() -> None:
         found = [most_violated_weights(star, point.x[star.columns], separator.programs)[0] for star in stars]
         assert np.allclose(found, expected, atol=1e-5)
         tried = {tuple(separator.stars.faces[face]) for face in separator.faces_to_try(point.x)}
-        assert all(tuple(star.face) in tried for star, short in zip(stars, found, strict=True) if short > 1e-5)
+        assert all(
+            tuple(star.face) in tried for star, short in zip(stars, found, strict=True) if short > 1e-5
+        )
         print(
             f"{number} | {lp_seconds:.2f} | {seconds:.3f} | {len(stars)} | {reference_seconds:.3f} "
             f"| {reference_seconds / seconds:.1f}",

@@ -1,8 +1,8 @@
-"""How much of the root gap do link cuts close, and how much do zero-half, clique and odd-cycle cuts?
+"""How much of the root gap link cuts close, and how much zero-half, clique and odd-cycle cuts.
 
-Minimum cardinality of spanning triangulations of ``random:n,3,seed=s``. An instance counts when its root LP is fractional in
-value: below the optimum by more than 1e-6. All variants start from the same LP over all empty simplices; no branching, no
-presolve, no heuristics.
+Minimum cardinality of spanning triangulations of ``random:n,3,seed=s``. An instance counts when its root LP is fractional
+in value: below the optimum by more than 1e-6. All variants start from the same LP over all empty simplices; no branching,
+no presolve, no heuristics.
 """
 
 from __future__ import annotations
@@ -43,7 +43,12 @@ def zero_half(instance: str, limit: float) -> dict[str, Any]:
     formulation = cocircuit_formulation(load_instance(instance), spanning=True)
     objective = make_objective("cardinality", formulation)
     options = TreeOptions(
-        nodes=1, presolve=False, heuristics=False, scip_separators=False, unlimited=("zerohalf",), seconds=limit
+        nodes=1,
+        presolve=False,
+        heuristics=False,
+        scip_separators=False,
+        unlimited=("zerohalf",),
+        seconds=limit,
     )
     tree = branch_and_cut(formulation, objective, options=options)
     values = [finished.lp for finished in tree.rounds]
@@ -61,7 +66,9 @@ def measure(n: int, seed: int, limit: float) -> dict[str, Any]:
     """Solve one instance; where its root LP is fractional, run every variant."""
     instance = f"random:{n},3,seed={seed}"
     solved = bcut.solve(instance, spanning=True)
-    assert solved.optimal and isinstance(solved.value, int) and solved.root.lp is not None
+    assert solved.optimal
+    assert isinstance(solved.value, int)
+    assert solved.root.lp is not None
     record: dict[str, Any] = {"lp": solved.root.lp, "optimum": solved.value, "variants": {}}
     if solved.value - solved.root.lp > 1e-6:
         for name, variant in VARIANTS.items():
@@ -74,7 +81,11 @@ def measure(n: int, seed: int, limit: float) -> dict[str, Any]:
 
 def table(records: list[dict[str, Any]]) -> str:
     """Write the means by size as a table."""
-    lines = ["| n | fractional | " + " | ".join(f"{name}: gap closed, integral, seconds" for name in VARIANTS) + " |"]
+    lines = [
+        "| n | fractional | "
+        + " | ".join(f"{name}: gap closed, integral, seconds" for name in VARIANTS)
+        + " |"
+    ]
     lines.append("|---|---|" + "---|" * len(VARIANTS))
     for n in (*SIZES, "all"):
         group = [r for r in records if r["variants"] and n in (r["key"][0], "all")]
@@ -85,7 +96,9 @@ def table(records: list[dict[str, Any]]) -> str:
             found = [record["variants"][name] for record in group]
             share = sum(f["share"] for f in found) / len(found)
             seconds = sum(f["seconds"] for f in found) / len(found)
-            cells.append(f"{100 * share:.1f} %, {sum(f['integral'] for f in found)} of {len(found)}, {seconds:.1f}")
+            cells.append(
+                f"{100 * share:.1f} %, {sum(f['integral'] for f in found)} of {len(found)}, {seconds:.1f}"
+            )
         total = sum(n in (r["key"][0], "all") for r in records)
         lines.append(f"| {n} | {len(group)} of {total} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -95,7 +108,9 @@ def main() -> None:
     """Run the experiment and print its table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True, help="folder for the results")
-    parser.add_argument("--limit", type=float, default=120.0, help="seconds for each variant on each instance")
+    parser.add_argument(
+        "--limit", type=float, default=120.0, help="seconds for each variant on each instance"
+    )
     options = parser.parse_args()
     keys = [(n, seed) for n in SIZES for seed in SEEDS]
     records = run_all(keys, lambda n, seed: measure(n, seed, options.limit), options.output / "runs.jsonl")

@@ -1,7 +1,7 @@
 """Minimum cardinality of random points to a proven optimum: `bcut` beside SCIP alone on the exported model.
 
-Spanning triangulations of ``random:n,3,seed=s``. Each run is a process of its own. SCIP reads the model that ``bcut export``
-wrote and runs with its defaults.
+Spanning triangulations of ``random:n,3,seed=s``. Each run is a process of its own. SCIP reads the model that
+``bcut export`` wrote and runs with its defaults.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ model.readProblem(sys.argv[1])
 model.setParam("limits/time", float(sys.argv[2]))
 model.optimize()
 value = model.getObjVal() if model.getNSols() else None
-print(json.dumps({"status": model.getStatus(), "value": value, "bound": model.getDualbound(), "nodes": model.getNTotalNodes()}))
+facts = {"status": model.getStatus(), "value": value, "bound": model.getDualbound(), "nodes": model.getNTotalNodes()}
+print(json.dumps(facts))
 """
 
 
@@ -46,7 +47,17 @@ def run(command: list[str]) -> tuple[dict[str, Any], float]:
 
 def with_bcut(instance: str, limit: float) -> dict[str, Any]:
     """Solve with the program's defaults."""
-    command = [sys.executable, "-m", "bcut", "solve", instance, "--spanning", "--json", "--time-limit", str(limit)]
+    command = [
+        sys.executable,
+        "-m",
+        "bcut",
+        "solve",
+        instance,
+        "--spanning",
+        "--json",
+        "--time-limit",
+        str(limit),
+    ]
     result, seconds = run(command)
     where = None
     if result["status"] == "optimal":
@@ -80,7 +91,8 @@ def measure(n: int, seed: int, *, limit: float, scip_limit: float) -> dict[str, 
 
 def table(records: list[dict[str, Any]]) -> str:
     """Write one row per instance."""
-    lines = ["| n | seed | root LP | bcut | proven at | seconds | separating | SCIP alone | seconds |", "|" + "---|" * 9]
+    head = "| n | seed | root LP | bcut | proven at | seconds | separating | SCIP alone | seconds |"
+    lines = [head, "|" + "---|" * 9]
     for record in records:
         n, seed = record["key"]
         ours, scip = record["bcut"], record["scip"]
@@ -100,7 +112,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True, help="folder for the results")
     parser.add_argument("--limit", type=float, default=1800.0, help="seconds for bcut on each instance")
-    parser.add_argument("--scip-limit", type=float, default=1800.0, help="seconds for SCIP alone on each instance")
+    parser.add_argument(
+        "--scip-limit", type=float, default=1800.0, help="seconds for SCIP alone on each instance"
+    )
     options = parser.parse_args()
     keys = [(n, seed) for n in SIZES for seed in SEEDS]
     job = partial(measure, limit=options.limit, scip_limit=options.scip_limit)

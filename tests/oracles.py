@@ -1,4 +1,4 @@
-"""Separators that know every triangulation: valid by construction, and they separate everything there is to separate."""
+"""Separators for tests; one knows every triangulation, so it is valid and separates all that can be separated."""
 
 from __future__ import annotations
 

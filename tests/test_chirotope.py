@@ -130,7 +130,9 @@ def test_a_reflection_turns_every_orientation() -> None:
 
 def test_too_many_subsets_are_refused_before_anything_is_allocated() -> None:
     points = np.random.default_rng(0).random((1000, 3))
-    with pytest.raises(TooLargeError, match=r"1000 points in dimension 3 .* at most 60,000,000 .*fewer points"):
+    with pytest.raises(
+        TooLargeError, match=r"1000 points in dimension 3 .* at most 60,000,000 .*fewer points"
+    ):
         Chirotope.of(PointConfiguration.from_values(points, name="many"))
 
 

@@ -433,11 +433,11 @@ def test_an_invalid_separator_fails_its_check_with_a_triangulation(tmp_path: Pat
 
 def test_what_a_separator_prints_stays_off_standard_output(tmp_path: Path, capsys: Captured) -> None:
     file = tmp_path / "talking.py"
-    file.write_text(INVALID.replace("        for", "        print('so many')\n        for").replace("yield", "0 and"))
+    file.write_text(RAISING.replace("raise RuntimeError", "return print").replace('ideas")', 'ideas") or ()'))
     assert run(["solve", "random:12,3,seed=1000", "--spanning", "--separator", str(file), "--json"]) == 0
     captured = capsys.readouterr()
     assert json.loads(captured.out)["value"] == 17
-    assert captured.err.startswith("so many\n")
+    assert captured.err.startswith("out of ideas\n")
 
 
 @pytest.mark.parametrize("method", ["auto", "scip"])

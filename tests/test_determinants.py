@@ -200,7 +200,9 @@ def test_the_bound_on_field_products_is_not_computed_in_64_bits() -> None:
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(2, 6), st.integers(0, 2**32), st.sampled_from(["1", "sqrt(2)", "cos(2*pi/7)"]), st.booleans())
+@given(
+    st.integers(2, 6), st.integers(0, 2**32), st.sampled_from(["1", "sqrt(2)", "cos(2*pi/7)"]), st.booleans()
+)
 def test_the_filter_errs_by_less_than_its_bound(d: int, seed: int, term: str, flat: bool) -> None:
     rng = np.random.default_rng(seed)
     if term == "1":

@@ -41,12 +41,17 @@ def added_by(*cuts: Cut, x: np.ndarray = HALVES, limits: Limits | None = None) -
 
 
 coefficient_lists = st.lists(
-    st.tuples(st.integers(0, 19), st.fractions(-5, 5, max_denominator=12)), min_size=1, max_size=6, unique_by=lambda p: p[0]
+    st.tuples(st.integers(0, 19), st.fractions(-5, 5, max_denominator=12)),
+    min_size=1,
+    max_size=6,
+    unique_by=lambda p: p[0],
 )
 
 
 @given(coefficient_lists, st.fractions(-9, 9, max_denominator=12))
-def test_scaling_keeps_the_integer_points_of_a_cut(entries: list[tuple[int, Fraction]], rhs: Fraction) -> None:
+def test_scaling_keeps_the_integer_points_of_a_cut(
+    entries: list[tuple[int, Fraction]], rhs: Fraction
+) -> None:
     columns, coefficients = [c for c, _ in entries], [v for _, v in entries]
     if not any(coefficients):
         return
@@ -80,11 +85,15 @@ def test_violation_and_efficacy() -> None:
 def test_cuts_that_are_not_violated_are_dropped_and_not_counted() -> None:
     separation = at_work(FORMULATION, one(Cut([0, 1], 1)))
     assert separation.round(HALVES) == []
-    assert separation.statistics["scripted"] == FamilyStatistics(1, 0, 0, separation.statistics["scripted"].seconds)
+    assert separation.statistics["scripted"] == FamilyStatistics(
+        1, 0, 0, separation.statistics["scripted"].seconds
+    )
 
 
 def test_counts_of_calls_finds_and_additions() -> None:
-    separation = at_work(FORMULATION, Scripted(lambda point: [Cut([0, 1, 2], 1), Cut([3, 4, 5], 1)]), Watching())
+    separation = at_work(
+        FORMULATION, Scripted(lambda point: [Cut([0, 1, 2], 1), Cut([3, 4, 5], 1)]), Watching()
+    )
     first = separation.round(HALVES)
     separation.confirm(first[0])
     separation.round(HALVES)
@@ -118,7 +127,13 @@ def test_a_least_efficacy() -> None:
 
 
 def test_equal_inequalities_are_one_cut() -> None:
-    same = [Cut([0, 1], 0), Cut([1, 0], 0), Cut([0, 1], Fraction(1, 2)), Cut([0, 1], 0, [2, 2]), Cut([0, 1, 2], 0, [3, 3, 0])]
+    same = [
+        Cut([0, 1], 0),
+        Cut([1, 0], 0),
+        Cut([0, 1], Fraction(1, 2)),
+        Cut([0, 1], 0, [2, 2]),
+        Cut([0, 1, 2], 0, [3, 3, 0]),
+    ]
     assert added_by(*same) == [([0, 1], [1, 1], 0)]
 
 
@@ -195,7 +210,9 @@ def fails_late(point: FractionalPoint) -> Iterable[Cut]:
 
 def test_a_separator_that_raises_is_named_with_its_own_traceback() -> None:
     separation = at_work(FORMULATION, Watching(), Scripted(fails_late, "late"))
-    with pytest.raises(SeparatorError, match=r"separator 'late': separate\(\) raised ZeroDivisionError: of my") as caught:
+    with pytest.raises(
+        SeparatorError, match=r"separator 'late': separate\(\) raised ZeroDivisionError: of my"
+    ) as caught:
         separation.round(HALVES)
     assert caught.value.separator == "late"
     assert "fail_in_a_helper" in caught.value.trace
@@ -205,7 +222,9 @@ def test_a_separator_that_raises_is_named_with_its_own_traceback() -> None:
 
 
 def test_a_separator_that_raises_in_setup_is_named() -> None:
-    with pytest.raises(SeparatorError, match=r"'fails-in-setup': setup\(\) raised ZeroDivisionError") as caught:
+    with pytest.raises(
+        SeparatorError, match=r"'fails-in-setup': setup\(\) raised ZeroDivisionError"
+    ) as caught:
         at_work(FORMULATION, FailsInSetup())
     assert "fail_in_a_helper" in caught.value.trace
 
@@ -228,10 +247,9 @@ def test_ctrl_c_in_a_separator_is_no_fault_of_it() -> None:
 
 
 def test_an_error_shows_where_it_was_raised_when_printed() -> None:
-    try:
+    with pytest.raises(SeparatorError) as caught:
         at_work(FORMULATION, Scripted(fails_late)).round(HALVES)
-    except SeparatorError as error:
-        assert "fail_in_a_helper" in "".join(traceback.format_exception(error))
+    assert "fail_in_a_helper" in "".join(traceback.format_exception(caught.value))
 
 
 def test_two_separators_of_one_name_are_refused() -> None:

@@ -30,15 +30,18 @@ def zero_one_points(formulation: Formulation) -> Iterator[frozenset[int]]:
         while True:
             free = fixed < 0
             base = matrix @ np.where(free, 0, fixed)
-            least, most = base + np.minimum(matrix[:, free], 0).sum(1), base + np.maximum(matrix[:, free], 0).sum(1)
+            least, most = (
+                base + np.minimum(matrix[:, free], 0).sum(1),
+                base + np.maximum(matrix[:, free], 0).sum(1),
+            )
             if (least > upper).any() or (most < lower).any():
                 return
             # A free variable whose value 1 (or 0) breaks a row must be 0 (or 1).
             entries = matrix[:, free]
-            one_breaks = ((least[:, None] + np.maximum(entries, 0) > upper[:, None])) | (
+            one_breaks = (least[:, None] + np.maximum(entries, 0) > upper[:, None]) | (
                 most[:, None] + np.minimum(entries, 0) < lower[:, None]
             )
-            zero_breaks = ((most[:, None] - np.maximum(entries, 0) < lower[:, None])) | (
+            zero_breaks = (most[:, None] - np.maximum(entries, 0) < lower[:, None]) | (
                 least[:, None] - np.minimum(entries, 0) > upper[:, None]
             )
             to_zero, to_one = one_breaks.any(0), zero_breaks.any(0)
@@ -115,7 +118,13 @@ def test_the_0_1_points_for_degenerate_points(values: list[list[int]], spanning:
 
 @pytest.mark.parametrize(
     ("instance", "spanning"),
-    [("grid:3,3", False), ("grid:3,2,2", True), ("antiprism:5", False), ("prism:5", False), ("icosahedron", False)],
+    [
+        ("grid:3,3", False),
+        ("grid:3,2,2", True),
+        ("antiprism:5", False),
+        ("prism:5", False),
+        ("icosahedron", False),
+    ],
 )
 def test_every_triangulation_satisfies_every_row(instance: str, spanning: bool) -> None:
     formulation = cocircuit_formulation(load_instance(instance), spanning=spanning)
@@ -135,9 +144,10 @@ def test_cocircuit_rows_are_orientations_at_interior_facets(instance: str) -> No
     formulation = cocircuit_formulation(configuration)
     assert formulation.row_faces[0] is None
     assert len(formulation.row_faces) == formulation.size[1]
-    rows = {face: dict(zip(row.indices, row.data, strict=True)) for face, row in zip(
-        formulation.row_faces, formulation.matrix, strict=True
-    )}
+    rows = {
+        face: dict(zip(row.indices, row.data, strict=True))
+        for face, row in zip(formulation.row_faces, formulation.matrix, strict=True)
+    }
     expected: dict[tuple[int, ...], dict[int, int]] = {}
     for column, simplex in enumerate(formulation.simplices.tolist()):
         for vertex in simplex:
@@ -167,7 +177,12 @@ def optimum(formulation: Formulation, costs: np.ndarray) -> int:
 @given(
     st.integers(2, 3).flatmap(
         lambda d: st.tuples(
-            st.lists(st.lists(st.integers(0, 4), min_size=d, max_size=d), min_size=d + 2, max_size=8, unique_by=tuple),
+            st.lists(
+                st.lists(st.integers(0, 4), min_size=d, max_size=d),
+                min_size=d + 2,
+                max_size=8,
+                unique_by=tuple,
+            ),
             st.lists(st.lists(st.integers(-3, 3), min_size=d, max_size=d), min_size=d, max_size=d),
             st.lists(st.integers(-5, 5), min_size=d, max_size=d),
         )

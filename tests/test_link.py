@@ -93,7 +93,9 @@ def test_wedges_of_each_triangulation_wind_once_or_are_absent(name: str, spannin
         assert set(np.unique(counts)) <= {0, 1}
 
 
-@pytest.mark.parametrize("name", ["polygon:7,center", "grid:3,3", "random:10,2,seed=1", "random:10,3,seed=4", "prism:6"])
+@pytest.mark.parametrize(
+    "name", ["polygon:7,center", "grid:3,3", "random:10,2,seed=1", "random:10,3,seed=4", "prism:6"]
+)
 def test_separation_of_a_star_is_exact(name: str) -> None:
     problem = problem_of(name)
     stars = Stars(problem.chirotope, problem.simplices)
@@ -197,8 +199,12 @@ def test_checker_refuses_a_strengthened_cut() -> None:
             columns, coefficients = np.asarray(cut.simplices), np.asarray(cut.coefficients)
             assert check_cut(problem, cut.proof["face"], columns, coefficients)
             # Lifted coefficients are the largest valid ones in some order, so not all of them can grow.
-            assert not check_cut(problem, cut.proof["face"], columns, coefficients + int(np.abs(coefficients).max()))
-            assert not check_cut(problem, [0, 1] if cut.proof["face"] != [0, 1] else [0, 2], columns, coefficients)
+            assert not check_cut(
+                problem, cut.proof["face"], columns, coefficients + int(np.abs(coefficients).max())
+            )
+            assert not check_cut(
+                problem, [0, 1] if cut.proof["face"] != [0, 1] else [0, 2], columns, coefficients
+            )
             tested += 1
     assert tested > 0
 

@@ -159,7 +159,9 @@ def test_bad_objectives_are_refused(square: Formulation, text: str, sense: str, 
         make_objective(text, square, sense=sense)
 
 
-def test_a_new_measure_is_a_function_with_a_name(square: Formulation, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_measure_is_a_function_with_a_name(
+    square: Formulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(MEASURES, "last", lambda configuration, simplices, argument: simplices[:, -1])
     assert make_objective("last:x", square).value([0, 3]) == 5
 
@@ -175,7 +177,8 @@ def test_values_are_exact_sums(costs: list[Fraction], data: st.DataObject) -> No
 
 
 @pytest.mark.parametrize(
-    ("costs", "fits"), [([2**40, -(2**40)], True), ([2**40 + 1], False), ([Fraction(1, 3), Fraction(2**39)], False)]
+    ("costs", "fits"),
+    [([2**40, -(2**40)], True), ([2**40 + 1], False), ([Fraction(1, 3), Fraction(2**39)], False)],
 )
 def test_only_small_numerators_are_kept_in_64_bits(costs: list[Any], fits: bool) -> None:
     objective = from_fractions("x", "min", [Fraction(c) for c in costs])
@@ -224,4 +227,7 @@ def test_solvers_see_costs_of_ordinary_size(costs: list[Any], counts: bool) -> N
 
 def test_read_costs_returns_the_default_and_the_table(tmp_path: Path) -> None:
     write(tmp_path / "c.json", {"default": "1/2", "costs": [[[3, 1, 0], 4]]})
-    assert read_costs(tmp_path / "c.json", load_instance("cube:2")) == (Fraction(1, 2), {(0, 1, 3): Fraction(4)})
+    assert read_costs(tmp_path / "c.json", load_instance("cube:2")) == (
+        Fraction(1, 2),
+        {(0, 1, 3): Fraction(4)},
+    )

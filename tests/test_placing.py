@@ -71,7 +71,14 @@ def test_placing_starts_with_many_collinear_and_coplanar_points() -> None:
 def test_placing_orders_algebraic_coordinates_exactly() -> None:
     # The three abscissas differ by less than floating point resolves.
     near = ["3363/2378", "sqrt(2)", "47321/33461"]
-    points = [[near[0], 0], [near[1], 1], [near[2], 0], [near[1], -1], [near[1], 0], ["2*sqrt(2)-3363/2378", 0]]
+    points = [
+        [near[0], 0],
+        [near[1], 1],
+        [near[2], 0],
+        [near[1], -1],
+        [near[1], 0],
+        ["2*sqrt(2)-3363/2378", 0],
+    ]
     assert_placed(PointConfiguration.from_values(points))
 
 

@@ -129,7 +129,9 @@ def test_slack_cuts_leave_and_may_come_back(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize("rounds", [0, 1, 3])
 def test_a_limit_on_rounds_with_cuts(rounds: int) -> None:
     formulation, objective, _ = with_gap(5)
-    found = root_bound(formulation, objective, at_work(formulation, HullCuts()), limits=RootLimits(rounds=rounds))
+    found = root_bound(
+        formulation, objective, at_work(formulation, HullCuts()), limits=RootLimits(rounds=rounds)
+    )
     assert found.status == "limit"
     assert len(found.rounds) == rounds + 1
     assert [bool(finished.cuts) for finished in found.rounds] == [True] * rounds + [False]
@@ -181,7 +183,9 @@ def test_separators_that_find_nothing_end_the_loop() -> None:
 def test_an_integral_point_is_not_shown_to_separators() -> None:
     formulation = cocircuit_formulation(load_instance("polygon:6"))
     watching = Watching()
-    found = root_bound(formulation, make_objective("random-costs:1", formulation), at_work(formulation, watching))
+    found = root_bound(
+        formulation, make_objective("random-costs:1", formulation), at_work(formulation, watching)
+    )
     assert found.status == "integral"
     assert not watching.points
 
@@ -228,7 +232,9 @@ def test_a_target_that_can_be_reached_keeps_all_that_reach_it(
 def test_cuts_that_coincide_after_fixing_are_one_cut() -> None:
     formulation = cocircuit_formulation(load_instance("polygon:6"))
     relaxation = Relaxation(formulation, make_objective("cardinality", formulation))
-    relaxation.add([cut_of([0, 1], [1, 1], 1), cut_of([0, 2], [1, 1], 1), cut_of([3], [1], 1), cut_of([4], [-1], -1)])
+    relaxation.add(
+        [cut_of([0, 1], [1, 1], 1), cut_of([0, 2], [1, 1], 1), cut_of([3], [1], 1), cut_of([4], [-1], -1)]
+    )
     smaller = relaxation.restricted_to(np.array([0, 5, 6]))
     assert [(cut.columns.tolist(), cut.rhs) for cut in smaller.cuts] == [([0], 1), ([], -1)]
     with pytest.raises(InfeasibleRelaxationError):

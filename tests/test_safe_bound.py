@@ -73,7 +73,9 @@ def test_random_multipliers_give_a_bound(sense: Any, magnitude: Fraction, dual_m
 
 @settings(max_examples=60, deadline=None)
 @given(costs_lists, st.sampled_from(["min", "max"]), st.sampled_from(MAGNITUDES))
-def test_the_duals_of_the_relaxation_give_nearly_its_value(costs: list[int], sense: Any, magnitude: Fraction) -> None:
+def test_the_duals_of_the_relaxation_give_nearly_its_value(
+    costs: list[int], sense: Any, magnitude: Fraction
+) -> None:
     objective = from_fractions("x", sense, [Fraction(cost) for cost in costs])
     relaxation = Relaxation(FORMULATION, objective)
     point = relaxation.solve()

@@ -111,7 +111,12 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Any]]:
 
 @pytest.mark.parametrize(
     ("instance", "spanning", "sense", "value"),
-    [("cube:3", False, "min", 5), ("cube:3", False, "max", 6), ("grid:3,3", True, "min", 8), ("moae", False, "max", 7)],
+    [
+        ("cube:3", False, "min", 5),
+        ("cube:3", False, "max", 6),
+        ("grid:3,3", True, "min", 8),
+        ("moae", False, "max", 7),
+    ],
 )
 def test_small_optima_with_all_of_scip(instance: str, spanning: bool, sense: str, value: int) -> None:
     formulation = cocircuit_formulation(load_instance(instance), spanning=spanning)
@@ -152,7 +157,9 @@ def test_separators_do_not_change_the_optimum(
 @pytest.mark.parametrize("names", [[], FAMILIES, ["hull"]])
 @pytest.mark.parametrize("number", range(6))
 @pytest.mark.parametrize("sense", ["min", "max"])
-def test_separators_do_not_change_the_optimum_where_they_have_work(sense: str, number: int, names: list[str]) -> None:
+def test_separators_do_not_change_the_optimum_where_they_have_work(
+    sense: str, number: int, names: list[str]
+) -> None:
     formulation, objective, optimum = with_gap(number, sense)
     separators = [HullCuts() if name == "hull" else resolve(name) for name in names]
     for options in (TreeOptions(**BARE), TreeOptions()):
@@ -181,7 +188,9 @@ def raise_in_a_helper(point: FractionalPoint) -> Iterator[Cut]:
 def test_a_separator_that_raises_in_scip_is_named_with_its_own_traceback() -> None:
     formulation, objective, _ = with_gap(0)
     separation = at_work(formulation, Watching(), Scripted(raise_in_a_helper, "mine"))
-    with pytest.raises(SeparatorError, match=r"separator 'mine': separate\(\) raised LookupError: nothing there") as caught:
+    with pytest.raises(
+        SeparatorError, match=r"separator 'mine': separate\(\) raised LookupError: nothing there"
+    ) as caught:
         branch_and_cut(formulation, objective, separation, options=TreeOptions(**BARE))
     assert "raise_in_a_helper" in caught.value.trace
     assert separation.statistics["mine"].calls == 1
@@ -189,14 +198,16 @@ def test_a_separator_that_raises_in_scip_is_named_with_its_own_traceback() -> No
 
 def test_a_malformed_cut_in_scip_is_named() -> None:
     formulation, objective, _ = with_gap(0)
-    with pytest.raises(SeparatorError, match="'mine': .*distinct columns"):
+    with pytest.raises(SeparatorError, match=r"'mine': .*distinct columns"):
         branch_and_cut(
             formulation, objective, at_work(formulation, Scripted(lambda point: [Cut([-1], 0)], "mine"))
         )
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
-def test_whatever_is_raised_while_rows_are_added_comes_out(monkeypatch: pytest.MonkeyPatch, error: Any) -> None:
+def test_whatever_is_raised_while_rows_are_added_comes_out(
+    monkeypatch: pytest.MonkeyPatch, error: Any
+) -> None:
     def add(self: Any, cut: Any) -> bool:
         raise error
 
@@ -230,7 +241,9 @@ def test_separators_are_called_at_every_depth(
 ) -> None:
     formulation, objective = branching
     watching = Watching()
-    result = branch_and_cut(formulation, objective, at_work(formulation, watching), options=TreeOptions(**BARE))
+    result = branch_and_cut(
+        formulation, objective, at_work(formulation, watching), options=TreeOptions(**BARE)
+    )
     depths = {depth for depth, _ in outcomes}
     assert result.nodes > 4
     # SCIP's default back-off would leave out depths 2 and 3.
@@ -308,6 +321,16 @@ def test_the_root_relaxation_is_recorded_without_separators() -> None:
     assert result.bound == pytest.approx(25)
 
 
+def test_an_integral_root_relaxation_is_recorded_too() -> None:
+    # SCIP separates nothing then, and is done after the first relaxation.
+    formulation = cocircuit_formulation(load_instance("cube:3"))
+    costs = np.random.default_rng(0).integers(0, 9, size=formulation.size[0])
+    result = branch_and_cut(formulation, costs_of(formulation, costs), options=TreeOptions(**BARE))
+    assert [finished.lp for finished in result.rounds] == pytest.approx(
+        [(incidence(formulation) @ costs).min()]
+    )
+
+
 def test_rounds_per_node_are_limited() -> None:
     formulation, objective, _ = with_gap(2)
     separation = at_work(formulation, HullCuts())
@@ -335,7 +358,9 @@ def test_a_cut_that_nothing_satisfies_cuts_the_node_off(
 ) -> None:
     formulation, objective, _ = with_gap(0)
     nothing = Scripted(lambda point: [Cut(point.support, -1)])
-    result = branch_and_cut(formulation, objective, at_work(formulation, nothing), options=TreeOptions(**BARE))
+    result = branch_and_cut(
+        formulation, objective, at_work(formulation, nothing), options=TreeOptions(**BARE)
+    )
     assert result.status == "infeasible"
     assert result.columns is None
     assert rows[0]["infeasible"]
@@ -454,6 +479,28 @@ def test_progress_tells_bounds_and_incumbents(sense: str) -> None:
     assert all(abs(bound) < 1e20 for bound in bounds)
 
 
+@pytest.mark.parametrize("scale", [Fraction(1, 10**12), Fraction(1, 3), Fraction(10**15)])
+def test_values_at_any_scale_of_costs(scale: Fraction) -> None:
+    formulation, plain, optimum = with_gap(5)
+    objective = from_fractions("scaled", "max", [-int(cost) * scale for cost in plain.numerators])
+    seen: list[dict[str, Any]] = []
+    result = branch_and_cut(
+        formulation,
+        objective,
+        options=TreeOptions(cutoff=float(-(optimum + 1) * scale)),
+        on_progress=seen.append,
+    )
+    assert result.status == "optimal"
+    assert result.columns is not None
+    assert objective.value(result.columns) == -optimum * scale
+    assert result.bound == pytest.approx(float(-optimum * scale), rel=1e-6)
+    assert result.rounds[0].lp == pytest.approx(float(Fraction(-15, 2) * scale), rel=1e-6)
+    values = [float(facts["value"] / scale) for facts in seen if facts["value"] is not None]
+    assert max(values) == pytest.approx(-optimum)
+    bounds = [float(facts["bound"] / scale) for facts in seen if facts["bound"] is not None]
+    assert min(bounds) == pytest.approx(-optimum, rel=0.1)
+
+
 INTERRUPTED = """
 import json, sys, bcut
 result = bcut.solve("dodecahedron", sense="max", method="scip", separators=[],
@@ -518,7 +565,10 @@ def test_variables_and_rows_carry_the_names_of_their_simplices() -> None:
     model, variables = build_model(formulation, make_objective("cardinality", formulation))
     names = ["x_" + "_".join(map(str, simplex)) for simplex in formulation.simplices.tolist()]
     assert [variable.name for variable in variables] == names
-    faces = ["coverage" if face is None else "cocircuit_" + "_".join(map(str, face)) for face in formulation.row_faces]
+    faces = [
+        "coverage" if face is None else "cocircuit_" + "_".join(map(str, face))
+        for face in formulation.row_faces
+    ]
     assert [constraint.name for constraint in model.getConss()] == faces
 
 

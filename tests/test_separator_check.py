@@ -10,9 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bcut.separators.clique import Clique
-from bcut.separators.convex_polygon import ConvexPolygon
-from bcut.separators.odd_cycle import OddCycle
 
 from bcut.errors import InputError, SeparatorLoadError
 from bcut.geometry.chirotope import Chirotope
@@ -23,6 +20,9 @@ from bcut.separation.driver import to_integers
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 from bcut.separation.template import template, write_template
+from bcut.separators.clique import Clique
+from bcut.separators.convex_polygon import ConvexPolygon
+from bcut.separators.odd_cycle import OddCycle
 
 FEW = (
     CaseName("hypersimplex:3,1"),

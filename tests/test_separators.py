@@ -10,16 +10,6 @@ from itertools import combinations
 import networkx as nx
 import numpy as np
 import pytest
-from bcut.separators.clique import Clique, heavy_cliques
-from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
-from bcut.separators.odd_cycle import (
-    OddCycle,
-    chordless_cycle,
-    heaviest_stable,
-    hole_gains,
-    odd_closed_walks,
-    sequential_lifting,
-)
 from numpy.typing import NDArray
 
 from bcut.bounds.root import RootBound, root_bound
@@ -32,6 +22,16 @@ from bcut.objectives.objective import Objective, make_objective
 from bcut.separation.driver import Separation, to_integers
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import FractionalPoint, Problem, Separator
+from bcut.separators.clique import Clique, heavy_cliques
+from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
+from bcut.separators.odd_cycle import (
+    OddCycle,
+    chordless_cycle,
+    heaviest_stable,
+    hole_gains,
+    odd_closed_walks,
+    sequential_lifting,
+)
 
 
 def problem(instance: str, *, spanning: bool = False) -> Problem:

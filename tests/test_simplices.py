@@ -12,7 +12,15 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.simplices import candidate_simplices, empty
 from bcut.instance import load_instance
 
-INSTANCES = ["grid:3,3", "grid:4,3", "moae", "polygon:5,center", "cube:3", "cross-polytope:3", "random:8,3,seed=2"]
+INSTANCES = [
+    "grid:3,3",
+    "grid:4,3",
+    "moae",
+    "polygon:5,center",
+    "cube:3",
+    "cross-polytope:3",
+    "random:8,3,seed=2",
+]
 
 
 def as_tuples(table: np.ndarray) -> list[tuple[int, ...]]:

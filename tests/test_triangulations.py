@@ -55,9 +55,7 @@ def test_all_that_is_found_are_different_triangulations(instance: str, spanning:
     assert len(set(found)) == len(found) > 0
     for columns in found:
         assert list(columns) == sorted(columns)
-        assert_triangulation(
-            configuration.scalars(), simplices[list(columns)].tolist(), spanning=spanning
-        )
+        assert_triangulation(configuration.scalars(), simplices[list(columns)].tolist(), spanning=spanning)
 
 
 def number_by_exhaustion(points: list[list[int]], *, spanning: bool) -> int:
@@ -92,7 +90,9 @@ def test_exhaustion_over_all_sets_of_simplices_finds_no_more(values: list[list[i
     st.lists(st.lists(st.integers(0, 3), min_size=3, max_size=3), min_size=5, max_size=7, unique_by=tuple),
     st.data(),
 )
-def test_the_number_does_not_depend_on_labels_or_coordinates(values: list[list[int]], data: st.DataObject) -> None:
+def test_the_number_does_not_depend_on_labels_or_coordinates(
+    values: list[list[int]], data: st.DataObject
+) -> None:
     configuration = configuration_or_none(values)
     assume(configuration is not None)
     order = data.draw(st.permutations(range(configuration.n)))

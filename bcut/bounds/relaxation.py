@@ -56,7 +56,9 @@ class Relaxation:
         Value of `time.monotonic` after which solving stops.
     """
 
-    def __init__(self, formulation: Formulation, objective: Objective, *, deadline: float | None = None) -> None:
+    def __init__(
+        self, formulation: Formulation, objective: Objective, *, deadline: float | None = None
+    ) -> None:
         self.formulation = formulation
         self.objective = objective
         self.deadline = deadline
@@ -95,7 +97,9 @@ class Relaxation:
         place = np.full(len(self.formulation.simplices), -1)
         place[columns] = np.arange(len(columns))
         smaller = Relaxation(
-            self.formulation.restricted_to(columns), self.objective.restricted_to(columns), deadline=self.deadline
+            self.formulation.restricted_to(columns),
+            self.objective.restricted_to(columns),
+            deadline=self.deadline,
         )
         # Cuts may coincide on what is left, or have nothing left.
         cuts = {cut.key: cut for cut in (cut.restricted_to(place) for cut in self.cuts)}
@@ -168,7 +172,9 @@ class Relaxation:
         if status == highspy.HighsModelStatus.kInfeasible:
             raise InfeasibleRelaxationError
         if status != highspy.HighsModelStatus.kOptimal:
-            raise SolverError(f"HiGHS ended with status {solver.modelStatusToString(status)} on the relaxation")
+            raise SolverError(
+                f"HiGHS ended with status {solver.modelStatusToString(status)} on the relaxation"
+            )
         solution = solver.getSolution()
         x = np.array(solution.col_value)
         base = self.formulation.matrix.shape[0]

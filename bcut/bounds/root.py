@@ -1,4 +1,4 @@
-"""The plain cutting-plane loop: linear relaxation, separators, and again, with no branching and no solver's own cuts."""
+"""The plain cutting-plane loop: linear relaxation, separators, and again; no branching, none of a solver's own cuts."""
 
 from __future__ import annotations
 

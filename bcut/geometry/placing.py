@@ -69,7 +69,7 @@ class _Growth:
         """Join a point outside the hull to every facet that it sees, or to everything where it extends the span."""
         if self.beyond and point == self.beyond[0]:
             self.beyond.pop(0)
-            base = {simplex: point for simplex in self.simplices}
+            base = dict.fromkeys(self.simplices, point)
             sides = {_with(facet, point): vertex for facet, vertex in self.boundary.items()}
             self.simplices = [_with(simplex, point) for simplex in self.simplices]
             self.boundary = {**base, **sides}

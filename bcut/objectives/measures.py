@@ -58,7 +58,9 @@ def cardinality(configuration: PointConfiguration, simplices: Simplices, argumen
 def random_costs(configuration: PointConfiguration, simplices: Simplices, argument: str) -> Costs:
     """Return doubles from ``numpy.random.default_rng(SEED).random(C(n, d+1))``, one per (d+1)-subset in colex order."""
     if not argument.isdecimal():
-        raise InputError(f"objective 'random-costs:{argument}': write random-costs:SEED with a non-negative integer")
+        raise InputError(
+            f"objective 'random-costs:{argument}': write random-costs:SEED with a non-negative integer"
+        )
     n = configuration.n
     drawn = np.random.default_rng(int(argument)).random(comb(n, configuration.dimension + 1))
     return [Fraction(value) for value in drawn[ranks(simplices, n)].tolist()]
@@ -103,12 +105,16 @@ def _read_json(path: Path) -> Any:
     except UnicodeDecodeError:
         raise InputError(f"costs file {path}: is not UTF-8 text") from None
     except json.JSONDecodeError as error:
-        raise InputError(f"costs file {path}: line {error.lineno}, column {error.colno}: {error.msg}") from None
+        raise InputError(
+            f"costs file {path}: line {error.lineno}, column {error.colno}: {error.msg}"
+        ) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"costs file {path}: cannot be read ({error})") from None
 
 
-def _entry(entry: Any, configuration: PointConfiguration, path: Path, number: int) -> tuple[tuple[int, ...], Fraction]:
+def _entry(
+    entry: Any, configuration: PointConfiguration, path: Path, number: int
+) -> tuple[tuple[int, ...], Fraction]:
     where = f"costs file {path}: entry {number}"
     if not (isinstance(entry, list) and len(entry) == 2 and isinstance(entry[0], list)):
         raise InputError(f"{where}: expected [[vertices], cost], not {json.dumps(entry)}")

@@ -228,7 +228,9 @@ def _collect(model: Model, variables: list[Variable], record: RootRecord, unit: 
     columns = None
     if model.getNSols() > 0:
         best = model.getBestSol()
-        chosen = [column for column, variable in enumerate(variables) if model.getSolVal(best, variable) > 0.5]
+        chosen = [
+            column for column, variable in enumerate(variables) if model.getSolVal(best, variable) > 0.5
+        ]
         columns = np.array(chosen, dtype=np.int64)
     bound = model.getDualbound()
     outcome: TreeStatus

@@ -79,7 +79,9 @@ def build_model(
 
 def _expression(terms: list[Term], columns: NDArray[np.integer], values: NDArray[np.float64]) -> Expr:
     """Return a linear expression; far faster than summing variables one by one."""
-    return Expr({terms[column]: value for column, value in zip(columns.tolist(), values.tolist(), strict=True)})
+    return Expr(
+        {terms[column]: value for column, value in zip(columns.tolist(), values.tolist(), strict=True)}
+    )
 
 
 def write_model(formulation: Formulation, objective: Objective, path: Path) -> None:

@@ -21,7 +21,7 @@ _LP_EVENTS = (SCIP_EVENTTYPE.FIRSTLPSOLVED, SCIP_EVENTTYPE.LPSOLVED)
 
 
 def _lp_is_optimal(model: Any) -> bool:
-    """Tell whether there is an LP solution to read; outside the solving stage even asking for its status is an error."""
+    """Tell whether there is an LP solution to read; outside the solving stage even asking for it is an error."""
     return model.getStage() == SCIP_STAGE.SOLVING and model.getLPSolstat() == SCIP_LPSOLSTAT.OPTIMAL
 
 
@@ -64,7 +64,11 @@ class RootRecord:
         """
         value = float(self.costs @ x)
         seconds = time.perf_counter() - self._started
-        if self.rounds and not self.rounds[-1].cuts and isclose(self.rounds[-1].lp, value, abs_tol=self.tolerance):
+        if (
+            self.rounds
+            and not self.rounds[-1].cuts
+            and isclose(self.rounds[-1].lp, value, abs_tol=self.tolerance)
+        ):
             seconds += self.rounds.pop().seconds
         self.rounds.append(Round(value, cuts, seconds))
         self._started = time.perf_counter()
@@ -149,7 +153,9 @@ class SeparatorAdapter(Sepa):
     def _add(self, cut: IntegerCut) -> bool:
         """Add one globally valid row; tell whether SCIP found the node infeasible by it."""
         model = self.model
-        row = model.createEmptyRowSepa(self, cut.family, lhs=None, rhs=float(cut.rhs), local=False, removable=True)
+        row = model.createEmptyRowSepa(
+            self, cut.family, lhs=None, rhs=float(cut.rhs), local=False, removable=True
+        )
         model.cacheRowExtensions(row)
         for column, coefficient in zip(cut.columns.tolist(), cut.coefficients.tolist(), strict=True):
             model.addVarToRow(row, self.values.transformed[column], float(coefficient))
@@ -200,13 +206,14 @@ class Observer(Eventhdlr):
         if self.on_progress is None:
             return
         model = self.model
-        primal, dual = model.getPrimalbound(), model.getDualbound()
-        infinity = model.infinity()
+        dual = model.getDualbound()
+        # The primal bound would be a cutoff's, where no solution is known yet.
+        best = model.getBestSol() if model.getNSols() else None
         self.on_progress(
             {
                 "stage": "tree",
-                "value": None if abs(primal) >= infinity else primal * self.unit,
-                "bound": None if abs(dual) >= infinity else dual * self.unit,
+                "value": None if best is None else model.getSolObjVal(best) * self.unit,
+                "bound": None if abs(dual) >= model.infinity() else dual * self.unit,
                 "nodes": model.getNTotalNodes(),
             }
         )

@@ -101,7 +101,9 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
     """
     indices = np.asarray(cut.simplices)
     if indices.ndim != 1 or not len(indices) or not np.issubdtype(indices.dtype, np.integer):
-        raise SeparatorError(family, f"a cut's simplices must be a non-empty list of columns, not {cut.simplices!r}")
+        raise SeparatorError(
+            family, f"a cut's simplices must be a non-empty list of columns, not {cut.simplices!r}"
+        )
     if indices.min() < 0 or indices.max() >= columns or len(np.unique(indices)) != len(indices):
         raise SeparatorError(family, f"a cut's simplices must be distinct columns from 0 to {columns - 1}")
     given = [1] * len(indices) if cut.coefficients is None else list(cut.coefficients)
@@ -119,7 +121,8 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
     right = floor(rhs * scale / divisor)
     coprime = [integers[i] // divisor for i in keep]
     if max(abs(value) for value in (right, *coprime)) >= 2**62:
-        raise UnusableCutError(family, "a cut has numbers of more than 62 bits as coprime integers; no solver can use it")
+        message = "a cut has numbers of more than 62 bits as coprime integers; no solver can use it"
+        raise UnusableCutError(family, message)
     coefficients = np.array(coprime, dtype=np.int64)
     return IntegerCut(family, indices[keep].astype(np.int64), coefficients, right, cut.proof)
 
@@ -134,7 +137,8 @@ def _exact(value: Any, family: str) -> Fraction:
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
         return Fraction(int(value))
     raise SeparatorError(
-        family, f"coefficients and right-hand sides are exact (int or Fraction), not {type(value).__name__} {value!r}"
+        family,
+        f"coefficients and right-hand sides are exact (int or Fraction), not {type(value).__name__} {value!r}",
     )
 
 
@@ -249,7 +253,9 @@ def check_names(separators: Sequence[Separator]) -> None:
     names = [separator.name for separator in separators]
     for name in names:
         if names.count(name) > 1:
-            raise SeparatorLoadError(f"separator '{name}' is given twice; give it once, or rename one of the two")
+            raise SeparatorLoadError(
+                f"separator '{name}' is given twice; give it once, or rename one of the two"
+            )
 
 
 class _Directions:

@@ -1,7 +1,8 @@
 """From what a user writes to a separator: a built-in name, a file, or an entry point, with parameters.
 
 ``clique``, ``odd-cycle:max_cuts=40,backend=networkx``, ``./my_cuts.py``, ``./my_cuts.py:MyCuts``,
-``./my_cuts.py:MyCuts:depth=3``. An installed package offers separators through the entry-point group ``bcut.separators``.
+``./my_cuts.py:MyCuts:depth=3``. An installed package offers separators through the entry-point group
+``bcut.separators``.
 """
 
 from __future__ import annotations
@@ -90,7 +91,9 @@ def built_in_names() -> list[str]:
     """Return the names of the built-in families: one for each file of `bcut.separators`."""
     package = importlib.import_module("bcut.separators")
     return sorted(
-        module.name.replace("_", "-") for module in pkgutil.iter_modules(package.__path__) if module.name[0] != "_"
+        module.name.replace("_", "-")
+        for module in pkgutil.iter_modules(package.__path__)
+        if module.name[0] != "_"
     )
 
 
@@ -127,7 +130,11 @@ def _class_by_name(specification: Specification) -> type[Separator]:
             return _from_entry_point(entry)
     known = [*built_in_names(), *(entry.name for entry in entries)]
     near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}; a file is given by its path."
+    hint = (
+        f"did you mean '{near[0]}'?"
+        if near
+        else f"known are {', '.join(known)}; a file is given by its path."
+    )
     raise SeparatorLoadError(f"unknown separator '{name}': {hint}")
 
 
@@ -139,7 +146,9 @@ def _built_in(name: str) -> type[Separator]:
 def _from_entry_point(entry: importlib.metadata.EntryPoint) -> type[Separator]:
     family = _guarded(entry.name, entry.load)
     if not (inspect.isclass(family) and issubclass(family, Separator)):
-        raise SeparatorLoadError(f"entry point '{entry.name}' ({entry.value}) is no subclass of bcut.Separator")
+        raise SeparatorLoadError(
+            f"entry point '{entry.name}' ({entry.value}) is no subclass of bcut.Separator"
+        )
     return family
 
 
@@ -161,7 +170,9 @@ def _class_from_file(specification: Specification) -> type[Separator]:
         return _only_class(module, str(path))
     family = getattr(module, specification.class_name, None)
     if not (inspect.isclass(family) and issubclass(family, Separator)):
-        raise SeparatorLoadError(f"separator file {path}: it has no class '{specification.class_name}' of bcut.Separator")
+        raise SeparatorLoadError(
+            f"separator file {path}: it has no class '{specification.class_name}' of bcut.Separator"
+        )
     return family
 
 
@@ -179,7 +190,8 @@ def _only_class(module: ModuleType, source: str) -> type[Separator]:
         return families[0]
     if not families:
         raise SeparatorLoadError(
-            f"separator file {source}: it defines no separator; derive a class from bcut.Separator and give it separate()"
+            f"separator file {source}: it defines no separator; "
+            "derive a class from bcut.Separator and give it separate()"
         )
     names = ", ".join(family.__name__ for family in families)
     raise SeparatorLoadError(f"separator file {source}: it defines {names}; say which by {source}:CLASS")
@@ -191,7 +203,9 @@ def _construct(family: type[Separator], specification: Specification, text: str)
     for name, value in specification.parameters.items():
         if name not in known:
             listed = ", ".join(known) or "none"
-            raise SeparatorLoadError(f"separator '{text}': no parameter '{name}'; its parameters are: {listed}")
+            raise SeparatorLoadError(
+                f"separator '{text}': no parameter '{name}'; its parameters are: {listed}"
+            )
         values[name] = _convert(value, known[name], f"separator '{text}': parameter {name}")
     try:
         separator = _guarded(text, lambda: family(**values))
@@ -201,7 +215,9 @@ def _construct(family: type[Separator], specification: Specification, text: str)
             raise SeparatorLoadError(f"separator '{text}': {error.__cause__}") from error
         raise
     if not separator.name:
-        raise SeparatorLoadError(f"separator '{text}': class {family.__name__} has no name; set `name = \"my-cuts\"`")
+        raise SeparatorLoadError(
+            f"separator '{text}': class {family.__name__} has no name; set `name = \"my-cuts\"`"
+        )
     return separator
 
 

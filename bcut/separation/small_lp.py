@@ -75,6 +75,8 @@ class SmallLps:
         solver.passModel(model)
         solver.run()
         if solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
-            raise ArithmeticError(f"small linear program: {solver.modelStatusToString(solver.getModelStatus())}")
+            raise ArithmeticError(
+                f"small linear program: {solver.modelStatusToString(solver.getModelStatus())}"
+            )
         prices = np.array(solver.getSolution().row_dual)[:k]
         return float(solver.getInfo().objective_function_value), np.maximum(prices, 0.0)

@@ -89,7 +89,9 @@ def solve(
     >>> bcut.solve("cube:3").value
     5
     """
-    run = _Run(instance, objective, sense, formulation, spanning, separators, time_limit, seed, method, on_progress)
+    run = _Run(
+        instance, objective, sense, formulation, spanning, separators, time_limit, seed, method, on_progress
+    )
     search = run.search
     try:
         _choose(method, search)(search)
@@ -116,7 +118,9 @@ def bound(
 
     Parameters are those of `solve`. The result has status "bound" and no triangulation.
     """
-    run = _Run(instance, objective, sense, formulation, spanning, separators, time_limit, seed, "auto", on_progress)
+    run = _Run(
+        instance, objective, sense, formulation, spanning, separators, time_limit, seed, "auto", on_progress
+    )
     search = run.search
     search.status = "bound"
     try:
@@ -223,7 +227,9 @@ class _Run:
         try:
             check_triangulation(self.configuration.scalars(), triangulation, spanning=self.question.spanning)
         except VerificationError as error:
-            raise SolverError(f"{self.configuration.name}: the solver's answer is no triangulation: {error}") from error
+            raise SolverError(
+                f"{self.configuration.name}: the solver's answer is no triangulation: {error}"
+            ) from error
 
     def _certificate(self) -> Certificate:
         search = self.search

@@ -24,6 +24,8 @@ from bcut.objectives.objective import Objective
 
 # Seconds for every subgroup: those that are decided quickly first, the hard ones again later.
 _PASSES = (2.0, 15.0, 90.0)
+# Orders of subgroups, at most: triangulations with more symmetries are rare.
+_LARGEST = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ def find_invariant_triangulation(
     from bcut.scip.host import TreeOptions, branch_and_cut
 
     sign = objective.sign
-    rest = list(some_subgroups(group, seed=seed) if subgroups is None else subgroups)
+    rest = list(some_subgroups(group, largest=_LARGEST, seed=seed) if subgroups is None else subgroups)
     best: InvariantTriangulation | None = None
     attempts = 0
     for seconds in _PASSES:

@@ -68,7 +68,11 @@ class OrbitStage:
             Returns the seconds that are left.
         """
         found = orbit_root_with_cuts(self.formulation, self.objective, rounds=rounds, seconds=seconds)
-        if found.root.bound is None or self.root.bound is None or found.root.bound.value <= self.root.bound.value:
+        if (
+            found.root.bound is None
+            or self.root.bound is None
+            or found.root.bound.value <= self.root.bound.value
+        ):
             return self
         return replace(self, formulation=found.formulation, root=found.root)
 

@@ -46,7 +46,9 @@ class Part:
     def restricted_to(self, columns: NDArray[np.intp]) -> Part:
         """Return the part on some columns of this one."""
         return Part(
-            self.formulation.restricted_to(columns), self.objective.restricted_to(columns), self.columns[columns]
+            self.formulation.restricted_to(columns),
+            self.objective.restricted_to(columns),
+            self.columns[columns],
         )
 
 
