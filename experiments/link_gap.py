@@ -1,8 +1,8 @@
 """How much of the root gap link cuts close, and how much zero-half, clique and odd-cycle cuts.
 
-Minimum cardinality of spanning triangulations of ``random:n,3,seed=s``. An instance counts when its root LP is fractional
-in value: below the optimum by more than 1e-6. All variants start from the same LP over all empty simplices; no branching,
-no presolve, no heuristics.
+Minimum cardinality of spanning triangulations of ``random:n,3,seed=s``. An instance counts when its root LP is
+fractional in value: below the optimum by more than 1e-6. All variants start from the same LP over all empty simplices;
+no branching, no presolve, no heuristics.
 """
 
 from __future__ import annotations

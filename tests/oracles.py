@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.optimize import linprog
 
 from bcut.formulations.cocircuits import cocircuit_formulation
@@ -14,6 +15,7 @@ from bcut.formulations.formulation import Formulation
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.objectives.objective import Objective, from_fractions
+from bcut.scip import host
 from bcut.separation.driver import Separation
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 
@@ -103,3 +105,28 @@ def with_gap(number: int, sense: Any = "min") -> tuple[Formulation, Objective, i
     objective = from_fractions("gap", sense, [Fraction(int(cost)) for cost in costs])
     values = incidence(formulation) @ costs
     return formulation, objective, int(values.min() if sense == "min" else values.max())
+
+
+#: SCIP alone with our separators: no presolve, no heuristics, none of its own cuts.
+BARE: dict[str, Any] = {"presolve": False, "heuristics": False, "scip_separators": False}
+
+
+def costs_of(formulation: Formulation, costs: Any, sense: Any = "min") -> Objective:
+    """An objective of integer costs."""
+    return from_fractions("test", sense, [Fraction(int(cost)) for cost in costs])
+
+
+def with_depth(monkeypatch: pytest.MonkeyPatch) -> tuple[Formulation, Objective]:
+    """A problem on which SCIP, with a bad branching rule from here on, goes down some levels."""
+    set_parameters = host._set_parameters
+
+    def with_bad_branching(model: Any, options: Any) -> None:
+        set_parameters(model, options)
+        model.setParam("branching/random/priority", 10**6)
+        model.setParam("propagating/maxrounds", 0)
+
+    monkeypatch.setattr(host, "_set_parameters", with_bad_branching)
+    formulation = cocircuit_formulation(load_instance("random:25,2,seed=1"), spanning=True)
+    return formulation, costs_of(
+        formulation, np.random.default_rng(2).integers(0, 2, size=formulation.size[0])
+    )

@@ -7,11 +7,15 @@ the triangulation uses all of them: it is spanning.
 
 from __future__ import annotations
 
+from fractions import Fraction
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.rank import pivot_columns
 from bcut.geometry.subsets import ranks
 
 
@@ -30,11 +34,19 @@ def placing_triangulation(configuration: PointConfiguration, chirotope: Chirotop
         Ascending simplices, in colexicographic order.
     """
     order = sorted(range(configuration.n), key=configuration.scalars().__getitem__)
-    growth = _Growth(chirotope, order)
+    growth = _Growth(chirotope, order, _first_basis(configuration, order))
     for point in order[1:]:
         growth.place(point)
     simplices = np.array(sorted(growth.simplices), dtype=np.int64)
     return simplices[np.argsort(ranks(simplices, chirotope.n))]
+
+
+def _first_basis(configuration: PointConfiguration, order: list[int]) -> list[int]:
+    """Return the first affine basis in the order: each point that is not in the span of those before it."""
+    points = configuration.scalars()
+    rows: list[list[Any]] = [[Fraction(1)] * len(order)]
+    rows += [[points[point][j] for point in order] for j in range(configuration.dimension)]
+    return [order[column] for column in pivot_columns(rows)]
 
 
 class _Growth:
@@ -51,19 +63,11 @@ class _Growth:
         appended.
     """
 
-    def __init__(self, chirotope: Chirotope, order: list[int]) -> None:
+    def __init__(self, chirotope: Chirotope, order: list[int], basis: list[int]) -> None:
         self.chirotope = chirotope
         self.simplices: list[tuple[int, ...]] = [(order[0],)]
         self.boundary: dict[tuple[int, ...], int] = {(): order[0]}
-        self.beyond = self._basis(order)[1:]
-
-    def _basis(self, order: list[int]) -> list[int]:
-        """Return the first affine basis in the order: each point that is not in the span of those before it."""
-        place_of = np.empty(len(order), dtype=np.int64)
-        place_of[order] = np.arange(len(order))
-        places = np.sort(place_of[self.chirotope.bases], axis=1)
-        first = places[np.lexsort(places.T[::-1])[0]]
-        return [order[place] for place in first]
+        self.beyond = basis[1:]
 
     def place(self, point: int) -> None:
         """Join a point outside the hull to every facet that it sees, or to everything where it extends the span."""

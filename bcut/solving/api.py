@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 import os
-import platform
 import time
 from collections.abc import Callable, Sequence
-from fractions import Fraction
-from math import inf
+from math import comb, inf
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-import bcut
-from bcut.errors import InputError, SeparatorLoadError, SolverError
+from bcut.errors import InputError, SeparatorLoadError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.symmetry import symmetry_group
 from bcut.instance import load_instance
 from bcut.objectives.measures import read_costs
 from bcut.objectives.objective import make_objective
-from bcut.result import Certificate, Instance, Question, Result, Root, RoundRecord, Size
+from bcut.result import Certificate, Question, Result
 from bcut.separation.driver import check_names
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Separator
+from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits
 from bcut.solving.certificates import make_certificate
+from bcut.solving.orbit_stage import OrbitStage, orbit_stage
+from bcut.solving.report import make_result
 from bcut.solving.search import Part, Progress, Search, bound_at_root, place
 from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_scip
 
 DEFAULT_SEPARATORS = ("link",)
 FORMULATIONS: dict[str, Callable[..., Formulation]] = {"2": cocircuit_formulation}
-METHODS = ("auto", "scip")
+METHODS = ("auto", "listing", "orbits", "scip")
+# From so many (d+1)-subsets on, the symmetries of a configuration are used where it has any.
+_ORBITS_FROM = 200_000
 
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
@@ -68,8 +69,10 @@ def solve(
         In seconds; what was found is returned when it is reached.
     seed : int
         Of the solver's random choices.
-    method : {"auto", "scip"}
-        "auto" bounds and fixes at the root before SCIP branches on what is left; "scip" hands SCIP everything.
+    method : {"auto", "listing", "orbits", "scip"}
+        "listing" lists all simplices, bounds and fixes at the root, and lets SCIP branch on what is left; "orbits"
+        does so with orbits of simplices under the symmetries, for cardinality only; "scip" hands SCIP everything.
+        "auto" takes orbits for large symmetric configurations, and lists otherwise.
     on_progress : callable, optional
         Told of stages, bounds and incumbents, as a dict.
 
@@ -94,7 +97,7 @@ def solve(
     )
     search = run.search
     try:
-        _choose(method, search)(search)
+        run.solve()
     except KeyboardInterrupt:
         search.status = "interrupted"
     if search.columns is None and search.status != "infeasible":
@@ -112,34 +115,26 @@ def bound(
     separators: Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
     seed: int = 0,
+    method: str = "auto",
     on_progress: Progress | None = None,
 ) -> Result:
     """Bound the optimum at the root, before and after cuts, with no branching and none of the solver's own cuts.
 
-    Parameters are those of `solve`. The result has status "bound" and no triangulation.
+    Parameters are those of `solve`, but for the method "scip". The result has status "bound" and no triangulation. Over
+    orbits, "link" is the only family that is at work, averaged over the symmetries.
     """
-    run = _Run(
-        instance, objective, sense, formulation, spanning, separators, time_limit, seed, "auto", on_progress
-    )
-    search = run.search
-    search.status = "bound"
-    try:
-        root = bound_at_root(search, search.whole, search.separation(search.whole))
-        search.exact = root.first
-        if root.last is not None:
-            search.raise_bound(root.last.value)
-        if root.status == "limit":
-            search.status = "limit"
-    except KeyboardInterrupt:
-        search.status = "interrupted"
-    search.columns = None
-    return run.finish()
-
-
-def _choose(method: str, search: Search) -> Callable[[Search], None]:
     if method == "scip":
-        return solve_in_scip
-    return solve_by_targets if search.whole.objective.counts_units else solve_at_once
+        raise InputError("method 'scip': it is for solve only; known here are auto, listing and orbits")
+    run = _Run(
+        instance, objective, sense, formulation, spanning, separators, time_limit, seed, method, on_progress
+    )
+    run.search.status = "bound"
+    try:
+        run.bound()
+    except KeyboardInterrupt:
+        run.search.status = "interrupted"
+    run.search.columns = None
+    return run.finish()
 
 
 class _Run:
@@ -165,10 +160,18 @@ class _Run:
         deadline = None if time_limit is None else time.monotonic() + time_limit
         self.configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
         started = time.perf_counter()
-        self.formulation = FORMULATIONS[formulation](self.configuration, spanning=spanning)
-        self.objective = make_objective(objective, self.formulation, sense=sense)
+        self.method = method
+        self.link = any(_describe(item).split(":")[0] == "link" for item in given)
+        self.stage = self._orbits(objective, sense, spanning, time_limit)
+        if self.stage is None:
+            listed = FORMULATIONS[formulation](self.configuration, spanning=spanning)
+            whole = Part.whole(listed, make_objective(objective, listed, sense=sense))
+            self.size = listed.size
+        else:
+            whole = known_triangulation(self.stage)
+            self.size = (int(self.stage.formulation.sizes.sum()), self.stage.formulation.matrix.shape[0] + 1)
         self.search = Search(
-            whole=Part.whole(self.formulation, self.objective),
+            whole=whole,
             make_separators=lambda: [_make(item) for item in given],
             deadline=deadline,
             seed=seed,
@@ -183,59 +186,72 @@ class _Run:
             separators=[_describe(item) for item in given],
             seed=seed,
             limits={"time": time_limit},
-            method=method,
+            method=self.method,
             costs=_embedded_costs(objective, self.configuration),
         )
 
+    def _orbits(self, objective: str, sense: str, spanning: bool, seconds: float | None) -> OrbitStage | None:
+        """Return the stage over orbits where that is the way to go, and settle what "auto" means."""
+        n, d = self.configuration.n, self.configuration.dimension
+        invariant = objective == "cardinality"
+        if self.method == "orbits" and not invariant:
+            raise InputError(
+                f"method 'orbits': objective '{objective}' is not known to be invariant; use cardinality"
+            )
+        if self.method == "auto":
+            large = invariant and comb(n, d + 1) >= _ORBITS_FROM
+            symmetric = large and symmetry_group(self.configuration).order > 1
+            self.method = "orbits" if symmetric else "listing"
+        if self.method != "orbits":
+            return None
+        return orbit_stage(self.configuration, objective, sense=sense, spanning=spanning, seconds=seconds)
+
+    def solve(self) -> None:
+        """Search for an optimum."""
+        if self.stage is not None:
+            solve_by_orbits(self.search, self.stage, cuts=self.link)
+        elif self.method == "scip":
+            solve_in_scip(self.search)
+        elif self.search.whole.objective.counts_units:
+            solve_by_targets(self.search)
+        else:
+            solve_at_once(self.search)
+
+    def bound(self) -> None:
+        """Bound at the root only."""
+        search = self.search
+        if self.stage is not None:
+            bound_by_orbits(search, self.stage, cuts=self.link)
+            search.status = "limit" if search.bound is None else "bound"
+            return
+        root = bound_at_root(search, search.whole, search.separation(search.whole))
+        search.exact = root.first
+        if root.last is not None:
+            search.raise_bound(root.last.value)
+        if root.status == "limit":
+            search.status = "limit"
+
     def finish(self) -> Result:
         """Verify what was found and write it down."""
-        search = self.search
-        triangulation = None
-        if search.columns is not None:
-            triangulation = self.formulation.simplices[np.sort(search.columns)].tolist()
-            with search.timed("verify"):
-                self._verify(triangulation)
-        search.seconds["total"] = time.perf_counter() - self.started
-        sign = search.sign
-        proven = None if search.bound is None else sign * self.objective.rounded_up(search.bound)
-        return Result(
-            instance=_describe_instance(self.configuration),
-            problem=self.question,
-            status=search.status,
-            value=_number(search.value),
-            bound=_number(proven),
-            gap=_gap(search.value, proven),
-            root=Root(
-                search.lp,
-                search.lp_after_cuts,
-                search.root_is_integral,
-                [_record(*item) for item in search.rounds],
-            ),
-            size=Size(*self.formulation.size, search.columns_after_fixing),
-            nodes=search.nodes,
-            separators={name: vars(family).copy() for name, family in search.statistics.items()},
-            seconds=search.seconds,
-            triangulation=triangulation,
-            certificate=self._certificate(),
-            versions=_versions(),
+        return make_result(
+            self.configuration,
+            self.question,
+            self.search,
+            size=self.size,
+            certificate=self.certificate(),
+            started=self.started,
         )
 
-    def _verify(self, triangulation: list[list[int]]) -> None:
-        from bcut.errors import VerificationError
-        from bcut.verification.triangulation import check_triangulation
-
-        try:
-            check_triangulation(self.configuration.scalars(), triangulation, spanning=self.question.spanning)
-        except VerificationError as error:
-            raise SolverError(
-                f"{self.configuration.name}: the solver's answer is no triangulation: {error}"
-            ) from error
-
-    def _certificate(self) -> Certificate:
-        search = self.search
-        if search.exact is None:
+    def certificate(self) -> Certificate:
+        """Write out the multipliers of the exact bound without cuts."""
+        exact = self.search.exact
+        if self.method == "orbits":
+            return Certificate(
+                reason="the bound was proven over orbits of simplices; its multipliers are not written"
+            )
+        if exact is None:
             return Certificate(reason="no relaxation was solved to optimality outside SCIP")
-        return make_certificate(self.formulation, self.objective, search.exact)
+        return make_certificate(self.search.whole.formulation, self.search.whole.objective, exact)
 
 
 def _check_options(formulation: str, time_limit: float | None, seed: int, method: str) -> None:
@@ -262,11 +278,6 @@ def _describe(item: SeparatorLike) -> str:
     return item if isinstance(item, str) else item.name
 
 
-def _describe_instance(configuration: PointConfiguration) -> Instance:
-    points = [list(point) for point in configuration.exact_points()]
-    return Instance(configuration.name, configuration.dimension, points, configuration.digest)
-
-
 def _embedded_costs(objective: str, configuration: PointConfiguration) -> dict[str, Any] | None:
     """Return the table of a costs file, so that the result alone is enough to verify the value."""
     kind, _, path = objective.partition(":")
@@ -275,42 +286,3 @@ def _embedded_costs(objective: str, configuration: PointConfiguration) -> dict[s
     default, table = read_costs(Path(path), configuration)
     entries = [[list(simplex), str(cost)] for simplex, cost in sorted(table.items())]
     return {"default": str(default), "costs": entries}
-
-
-def _record(stage: str, finished: Any) -> RoundRecord:
-    return RoundRecord(finished.lp, finished.cuts, stage)
-
-
-def _number(value: Fraction | None) -> int | float | None:
-    if value is None:
-        return None
-    return int(value) if value.denominator == 1 else float(value)
-
-
-def _gap(value: Fraction | None, proven: Fraction | None) -> float | None:
-    if value is None or proven is None:
-        return None
-    return abs(float(value - proven)) / max(1.0, abs(float(value)))
-
-
-def _versions() -> dict[str, str]:
-    from importlib.metadata import version
-
-    return {
-        "bcut": bcut.__version__,
-        "scip": _scip_version(),
-        "pyscipopt": version("pyscipopt"),
-        "highs": version("highspy"),
-        "python": platform.python_version(),
-    }
-
-
-def _scip_version() -> str:
-    """Return SCIP's version from the library when it is loaded anyway, so that root-only runs need not load it."""
-    import sys
-
-    if "pyscipopt" not in sys.modules:
-        return "not used"
-    from bcut.scip.host import scip_version
-
-    return scip_version()

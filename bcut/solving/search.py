@@ -169,7 +169,14 @@ def bound_at_root(
     return root
 
 
-def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float | None = None) -> str:
+def branch(
+    search: Search,
+    part: Part,
+    root: RootBound | None,
+    *,
+    cutoff: float | None = None,
+    seconds: float | None = None,
+) -> str:
     """Let SCIP search a part, with the cuts and separators of its root bound; returns SCIP's status.
 
     Parameters
@@ -181,6 +188,8 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     cutoff : float, optional
         Only triangulations strictly better than this are wanted. Without it the part is the whole, and the
         search starts from the best triangulation so far.
+    seconds : float, optional
+        At most so long, within the deadline of the search.
     """
     from bcut.scip.host import TreeOptions, branch_and_cut
 
@@ -189,7 +198,8 @@ def branch(search: Search, part: Part, root: RootBound | None, *, cutoff: float 
     else:
         separation, cuts = root.separation, root.cuts
         part = part.restricted_to(root.columns)
-    options = TreeOptions(seconds=search.seconds_left, seed=search.seed, cutoff=cutoff)
+    limits = [limit for limit in (search.seconds_left, seconds) if limit is not None]
+    options = TreeOptions(seconds=min(limits, default=None), seed=search.seed, cutoff=cutoff)
 
     def on_progress(facts: dict[str, Any]) -> None:
         # With a cutoff, SCIP's bounds are those of a part only.

@@ -28,7 +28,7 @@ def solve_by_targets(search: Search) -> None:
     unit = objective.unit
     search.raise_bound(objective.rounded_up(root.first.value))
     refuted = 0
-    while not _is_optimal(search):
+    while not is_optimal(search):
         assert search.bound is not None
         step = max(1, abs(search.bound) // (1000 * unit)) << max(0, refuted - 1)
         target = search.bound + (step - 1) * unit
@@ -48,7 +48,8 @@ def solve_by_targets(search: Search) -> None:
     search.status = "optimal"
 
 
-def _is_optimal(search: Search) -> bool:
+def is_optimal(search: Search) -> bool:
+    """Tell whether the best triangulation found meets the proven bound."""
     value = search.value
     return value is not None and search.bound is not None and search.sign * value <= search.bound
 
@@ -75,7 +76,7 @@ def _reach(
     status = branch(search, part, root, cutoff=float(search.sign * (target + objective.unit / 2)))
     if status == "infeasible":
         return "refuted"
-    if status == "optimal" or _is_optimal(search):
+    if status == "optimal" or is_optimal(search):
         return "reached"
     return "interrupted" if status == "interrupted" else "limit"
 

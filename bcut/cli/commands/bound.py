@@ -20,6 +20,14 @@ from bcut.cli.running import carry_out
 @instance_argument
 @objective_options
 @separator_options
+@click.option(
+    "--method",
+    type=click.Choice(["auto", "listing", "orbits"]),
+    default="auto",
+    show_default=True,
+    help="listing: all simplices. orbits: orbits of simplices under the symmetries (cardinality only; of the "
+    "separators only link is at work). auto: orbits for large symmetric configurations, else listing.",
+)
 @run_options
 @report_options
 def bound(**options: Any) -> int:

@@ -22,10 +22,12 @@ from bcut.cli.running import carry_out
 @separator_options
 @click.option(
     "--method",
-    type=click.Choice(["auto", "scip"]),
+    type=click.Choice(["auto", "listing", "orbits", "scip"]),
     default="auto",
     show_default=True,
-    help="auto: bound and fix at the root, then branch on what is left. scip: leave everything to SCIP.",
+    help="listing: list all simplices, bound and fix at the root, then branch on what is left. orbits: the same with "
+    "orbits of simplices under the symmetries (cardinality only). scip: leave everything to SCIP. auto: orbits for "
+    "large symmetric configurations, else listing.",
 )
 @run_options
 @report_options

@@ -1,0 +1,70 @@
+"""Solving and bounding over orbits of simplices gives what listing all simplices gives."""
+
+from __future__ import annotations
+
+import pytest
+
+import bcut
+from bcut.errors import InputError
+
+CASES = [
+    ("cube:3", False),
+    ("cube:4", False),
+    ("grid:3,3", False),
+    ("grid:3,3", True),
+    ("prism:6", False),
+    ("cuboctahedron", False),
+    ("icosahedron", False),
+    ("dodecahedron", False),
+    ("cross-polytope:4", False),
+    ("cyclic:8,4", False),
+    ("simplex-product:2,1,1", False),
+    ("moae", True),
+    ("random:8,3,seed=1", True),
+]
+
+
+@pytest.mark.parametrize(("name", "spanning"), CASES)
+@pytest.mark.parametrize("sense", ["min", "max"])
+def test_orbits_and_listing_agree(name: str, spanning: bool, sense: str) -> None:
+    listed = bcut.solve(name, sense=sense, spanning=spanning, method="listing")
+    averaged = bcut.solve(name, sense=sense, spanning=spanning, method="orbits")
+    assert (averaged.status, averaged.value, averaged.bound) == ("optimal", listed.value, listed.value)
+    assert averaged.root.lp == pytest.approx(listed.root.lp, abs=1e-6)
+    assert averaged.size.columns == listed.size.columns
+    assert averaged.problem.method == "orbits"
+    assert bcut.verify(averaged).value == listed.value
+
+
+@pytest.mark.parametrize("name", ["24-cell", "hypersimplex:6,3"])
+def test_minimum_of_a_large_symmetric_polytope_meets_its_orbit_bound(name: str) -> None:
+    result = bcut.solve(name, method="orbits")
+    assert result.optimal
+    assert result.root.lp == pytest.approx(result.value, abs=1e-6)
+
+
+def test_the_five_cube_is_bounded_over_orbits_by_itself() -> None:
+    result = bcut.bound("cube:5")
+    assert result.problem.method == "orbits"
+    assert (result.status, result.bound) == ("bound", 67)
+    assert result.size.columns == 556_192
+
+
+def test_averaged_link_cuts_close_the_gap_of_the_dodecahedron() -> None:
+    without = bcut.bound("dodecahedron", method="orbits", separators=[])
+    assert without.root.lp_after_cuts == pytest.approx(22.5, abs=1e-6)
+    assert bcut.bound("dodecahedron", method="orbits").root.lp_after_cuts == pytest.approx(23, abs=1e-6)
+
+
+def test_a_time_limit_leaves_a_triangulation_and_a_bound() -> None:
+    result = bcut.solve("icosidodecahedron", sense="max", method="orbits", time_limit=3)
+    assert result.status == "limit"
+    assert result.triangulation is not None
+    assert result.value <= result.bound
+
+
+def test_orbits_refuse_what_is_not_known_to_be_invariant() -> None:
+    with pytest.raises(InputError, match=r"random-costs:1.*cardinality"):
+        bcut.solve("cube:3", objective="random-costs:1", method="orbits")
+    with pytest.raises(InputError, match="solve only"):
+        bcut.bound("cube:3", method="scip")
