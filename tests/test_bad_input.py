@@ -170,7 +170,7 @@ TABLE = [
     option("cube:3 --seed -4", r"seed -4", r"not negative"),
     option("cube:3 --sense least", r"--sense", r"'least'", r"min.*max"),
     option("cube:3 --formulation 9", r"unknown formulation '9'", r"known are 2"),
-    option("cube:3 --method magic", r"--method", r"auto.*scip"),
+    option("cube:3 --method magic", r"--method", r"auto.*listing.*orbits.*scip"),
     option("cube:3 --objective cardinal", r"unknown objective 'cardinal'", r"did you mean 'cardinality'"),
     option("cube:3 --objective cardinality:3", r"'cardinality' takes no argument", r"'3'"),
     option("cube:3 --objective random-costs:x", r"random-costs:x", r"random-costs:SEED"),

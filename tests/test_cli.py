@@ -20,7 +20,7 @@ import pytest
 import bcut
 from bcut.cli.main import bcut as program
 from bcut.cli.main import run
-from bcut.solving.api import DEFAULT_SEPARATORS
+from bcut.solving.api import DEFAULT_SEPARATORS, METHODS
 
 Captured = pytest.CaptureFixture[str]
 
@@ -111,6 +111,13 @@ def test_the_help_names_the_default_separators() -> None:
     assert f"Without this option: {' and '.join(DEFAULT_SEPARATORS)}." in option.help
 
 
+def test_the_methods_are_those_of_the_library() -> None:
+    for name, missing in (("solve", set()), ("bound", {"scip"})):
+        (option,) = [p for p in COMMANDS[name,].params if p.name == "method"]
+        assert isinstance(option.type, click.Choice)
+        assert set(option.type.choices) == set(METHODS) - missing
+
+
 def test_version(capsys: Captured) -> None:
     assert run(["--version"]) == 0
     assert capsys.readouterr().out == f"bcut {bcut.__version__}\n"
@@ -120,22 +127,16 @@ def test_version(capsys: Captured) -> None:
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["solve", "--help"], ["separators", "list"]], ids=" ".join)
-def test_the_light_commands_load_nothing_heavy_and_answer_fast(arguments: list[str]) -> None:
+def test_the_light_commands_load_nothing_heavy(arguments: list[str]) -> None:
     code = (
         "import sys; from bcut.cli.main import run; status = run(sys.argv[1:]);"
         "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr); sys.exit(status)"
     )
-    seconds = []
-    for _ in range(3):
-        started = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
-        )
-        seconds.append(time.perf_counter() - started)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
+    )
     assert done.stdout
     assert not HEAVY & set(done.stderr.split())
-    # A machine that does other things too may be slow once.
-    assert min(seconds) < 0.5
 
 
 def test_importing_the_package_loads_nothing() -> None:

@@ -26,7 +26,7 @@ def summary(result: Result, output: Path | None = None) -> str:
         columns += f"; {size.columns_after_fixing:,} columns after fixing"
     rows = [
         ("problem", f"{problem.sense} {problem.objective} over all {kind}"),
-        ("program", f"formulation {problem.formulation}: {columns}"),
+        ("program", f"formulation {problem.formulation}, method {problem.method}: {columns}"),
         ("root LP", f"{_number(result.root.lp)}, after cuts {_number(result.root.lp_after_cuts)}"),
         ("value", _number(result.value)),
         ("bound", _number(result.bound)),

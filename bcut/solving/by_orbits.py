@@ -6,6 +6,7 @@ No step lists all simplices, so configurations such as the 6-cube, with 366 mill
 from __future__ import annotations
 
 from fractions import Fraction
+from math import comb
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,8 @@ from bcut.solving.strategies import is_optimal
 # SCIP looks at a program with at most so many columns for some seconds before subgroups are tried.
 _SMALL = 15_000
 _SECONDS_FOR_SMALL = 20.0
+# Averaged link cuts look at every orbit of (d-2)-faces; with more faces than this they take longer than they are worth.
+_MOST_FACES = 300_000
 
 
 def known_triangulation(stage: OrbitStage) -> Part:
@@ -63,7 +66,8 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
     search.lp = search.lp_after_cuts = root.lp
     search.raise_bound(root.bound.value)
     search.report("orbits", lp=root.lp)
-    if cuts and not is_optimal(search):
+    n, d = stage.configuration.n, stage.configuration.dimension
+    if cuts and not is_optimal(search) and comb(n, d - 1) <= _MOST_FACES:
         with search.timed("root"):
             left = search.seconds_left
             stage = stage.with_link_cuts(seconds=None if left is None else lambda: search.seconds_left or 0.0)
