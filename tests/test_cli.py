@@ -328,30 +328,75 @@ def test_the_time_limit_is_kept_and_what_was_found_is_written(tmp_path: Path) ->
     assert "triangulation verified" in bcut.verify(file).statement
 
 
-def interrupted(arguments: list[str], after: float) -> tuple[int, str, str]:
-    with subprocess.Popen(
-        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        time.sleep(after)
-        assert process.poll() is None, "finished before it could be interrupted"
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=120)
-    return process.returncode, out, err
+# Presses Ctrl-C as soon as a solve reports from the stage that is asked for.
+PRESSING = """
+import contextlib, os, signal, sys
+import bcut.cli.progress as progress
+from bcut.cli.main import run
+
+@contextlib.contextmanager
+def line(*, quiet):
+    def watch(facts):
+        if facts["stage"] == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGINT)
+    yield watch
+
+progress.progress_line = line
+sys.exit(run(sys.argv[2:]))
+"""
 
 
-@pytest.mark.parametrize("method", ["auto", "scip"])
-def test_ctrl_c_keeps_what_was_found(method: str, tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    # Too large to be solved in a few seconds; with "scip" small enough for SCIP to look at the signal in time.
-    instance = "random:30,3,seed=0" if method == "auto" else "random:22,3,seed=5"
-    arguments = ["solve", instance, "--spanning", "--no-separators", "--method", method]
-    status, out, err = interrupted([*arguments, "--json", "--output", str(file)], 4.0)
+def check_interrupted(status: int, out: str, err: str, file: Path) -> None:
     assert status == 130
     assert "Traceback" not in err
     data = json.loads(out)
     assert data == json.loads(file.read_text())
     assert data["status"] == "interrupted"
     assert "triangulation verified" in bcut.verify(file).statement
+
+
+@pytest.mark.parametrize(("method", "stage"), [("listing", "root"), ("listing", "tree"), ("scip", "tree")])
+def test_ctrl_c_in_any_stage_keeps_what_was_found(method: str, stage: str, tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    arguments = ["solve", "random:20,3,seed=1001", "--spanning", "--no-separators"]
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            PRESSING,
+            stage,
+            *arguments,
+            "--method",
+            method,
+            "--json",
+            "--output",
+            str(file),
+        ],
+        capture_output=True,
+        text=True,
+    )
+    check_interrupted(done.returncode, done.stdout, done.stderr, file)
+
+
+def test_ctrl_c_from_outside_keeps_what_was_found(tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    # Its cardinality is out of reach in seconds without separators.
+    arguments = [
+        "solve",
+        "random:30,3,seed=0",
+        "--spanning",
+        "--no-separators",
+        "--json",
+        "--output",
+        str(file),
+    ]
+    with subprocess.Popen(
+        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        time.sleep(4)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    check_interrupted(process.returncode, out, err, file)
 
 
 def test_ctrl_c_before_anything_was_found_leaves_nothing(
