@@ -129,7 +129,9 @@ class Link(Separator):
         if coefficients @ values <= _SHORTFALL:
             return None
         kept = np.flatnonzero(coefficients)
-        proof = {"face": star.face.tolist(), "alpha": alpha, "weights": lifted.tolist()}
+        # Each wedge by the two points it turns between, and its weight: all that is needed to compute alpha again.
+        wedges = np.column_stack((star.points[star.tails], star.points[star.heads], lifted))
+        proof = {"face": star.face.tolist(), "alpha": alpha, "wedges": wedges.tolist()}
         return Cut(star.columns[kept], 0, coefficients[kept], proof)
 
 

@@ -160,6 +160,25 @@ def test_five_wedges_that_wind_twice_are_cut_off() -> None:
     assert point.value(cuts[0]) > cuts[0].rhs + 0.4
 
 
+def test_the_proof_holds_all_that_alpha_needs() -> None:
+    problem = problem_of("polygon:7,center")
+    stars = Stars(problem.chirotope, problem.simplices)
+    star = stars.star(0)
+    x = np.zeros(len(problem.simplices))
+    # Seven wedges of three sevenths of a turn, at 1/3: one walk that winds three times.
+    x[star.columns[star.spans == 3]] = 1 / 3
+    separator = Link()
+    separator.setup(problem)
+    cuts = list(separator.separate(FractionalPoint(problem, x)))
+    assert len(cuts) == 1
+    proof = cuts[0].proof
+    assert proof["face"] == [7]
+    weights = {(tail, head): weight for tail, head, weight in proof["wedges"]}
+    ends = zip(star.points[star.tails].tolist(), star.points[star.heads].tolist(), strict=True)
+    by_wedge = np.array([weights[wedge] for wedge in ends])
+    assert min(by_wedge[walk].sum() for walk in once_winding_walks(star)) == proof["alpha"]
+
+
 @pytest.mark.parametrize(("name", "spanning"), SMALL)
 @pytest.mark.parametrize("lift", [True, False])
 def test_no_cut_removes_a_triangulation(name: str, spanning: bool, lift: bool) -> None:
