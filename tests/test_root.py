@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from fractions import Fraction
 from typing import Any
 
+import highspy
 import numpy as np
 import pytest
 from oracles import HullCuts, Scripted, Watching, at_work, incidence, with_gap
@@ -308,3 +310,21 @@ def test_malformed_cuts_are_refused_with_the_name_of_the_separator(script: Any, 
     with pytest.raises(SeparatorError, match=f"separator 'mine': .*{message}") as caught:
         root_bound(formulation, objective, at_work(formulation, Scripted(script, "mine")))
     assert caught.value.separator == "mine"
+
+
+def test_an_interrupt_stops_a_relaxation_in_the_middle() -> None:
+    formulation = cocircuit_formulation(load_instance("random:30,3,seed=0"), spanning=True)
+    relaxation = Relaxation(formulation, make_objective("cardinality", formulation))
+
+    def press(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGALRM, press)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            relaxation.solve()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert relaxation._solver.getModelStatus() == highspy.HighsModelStatus.kInterrupt

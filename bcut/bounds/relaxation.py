@@ -194,7 +194,7 @@ class Relaxation:
                 return highspy.HighsModelStatus.kTimeLimit
             solver.setOptionValue("time_limit", solver.getRunTime() + remaining)
         solver.setOptionValue("solver", "ipm" if self._interior_point else "simplex")
-        solver.run()
+        _run_interruptibly(solver)
         return solver.getModelStatus()
 
     def safe_bound(self, duals: NDArray[np.float64]) -> SafeBound:
@@ -227,3 +227,23 @@ def _with_infinities(sides: NDArray[np.int64]) -> NDArray[np.float64]:
     values[sides == UNBOUNDED] = np.inf
     values[sides == -UNBOUNDED] = -np.inf
     return values
+
+
+def _run_interruptibly(solver: Any) -> None:
+    """Run HiGHS in its own thread, so that Ctrl-C is heard at once and not when the program is solved.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        After HiGHS has stopped.
+    """
+    solver.HandleUserInterrupt = True
+    solver.startSolve()
+    try:
+        finished = False
+        while not finished:
+            finished, _ = solver.wait(0.1)
+    except KeyboardInterrupt:
+        solver.cancelSolve()
+        solver.wait()
+        raise
