@@ -6,6 +6,7 @@ import pytest
 
 import bcut
 from bcut.errors import InputError
+from bcut.solving import api, by_orbits
 
 CASES = [
     ("cube:3", False),
@@ -61,6 +62,24 @@ def test_a_time_limit_leaves_a_triangulation_and_a_bound() -> None:
     assert result.status == "limit"
     assert result.triangulation is not None
     assert result.value <= result.bound
+
+
+def test_an_interrupt_leaves_the_triangulation_that_took_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    def press(*_: object) -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(by_orbits, "_reach", press)
+    result = bcut.solve("dodecahedron", method="orbits")
+    assert result.status == "interrupted"
+    assert result.triangulation is not None
+    assert result.value >= result.bound == 23
+
+
+def test_other_families_than_link_get_the_listing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(api, "_ORBITS_FROM", 10)
+    assert bcut.bound("cube:3", separators=["link"]).problem.method == "orbits"
+    assert bcut.bound("cube:3", separators=[]).problem.method == "orbits"
+    assert bcut.bound("cube:3", separators=["link", "clique"]).problem.method == "listing"
 
 
 def test_orbits_refuse_what_is_not_known_to_be_invariant() -> None:

@@ -161,7 +161,8 @@ class _Run:
         self.configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
         started = time.perf_counter()
         self.method = method
-        self.link = any(_describe(item).split(":")[0] == "link" for item in given)
+        families = {_describe(item).split(":")[0] for item in given}
+        self.link, self.only_link = "link" in families, families <= {"link"}
         self.stage = self._orbits(objective, sense, spanning, time_limit)
         if self.stage is None:
             listed = FORMULATIONS[formulation](self.configuration, spanning=spanning)
@@ -199,7 +200,8 @@ class _Run:
                 f"method 'orbits': objective '{objective}' is not known to be invariant; use cardinality"
             )
         if self.method == "auto":
-            large = invariant and comb(n, d + 1) >= _ORBITS_FROM
+            # Other families than link are at work in the tree only, over orbits: who asks for them wants the listing.
+            large = invariant and self.only_link and comb(n, d + 1) >= _ORBITS_FROM
             symmetric = large and symmetry_group(self.configuration).order > 1
             self.method = "orbits" if symmetric else "listing"
         if self.method != "orbits":

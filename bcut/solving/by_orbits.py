@@ -105,9 +105,12 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             break
         search.whole, search.columns = Part.whole(formulation, costs), None
         search.columns_after_fixing = len(formulation.simplices)
-        outcome = _reach(search, stage, target)
-        if search.value is None or (best is not None and search.sign * search.value > search.sign * best):
-            search.whole, search.columns = known, known.columns
+        try:
+            outcome = _reach(search, stage, target)
+        finally:
+            # Also after Ctrl-C: what is handed out is a triangulation in any case.
+            if search.value is None or (best is not None and search.sign * search.value > search.sign * best):
+                search.whole, search.columns = known, known.columns
         if outcome == "refuted":
             search.raise_bound(target + objective.unit)
         elif outcome != "reached":
