@@ -78,7 +78,14 @@ class Certificate:
     flag : list of int or None
         Ordered vertices that define the generic point of the coverage row.
     multipliers : list of [row, rational] or None
-        Row is "coverage" or the vertices of an interior (d-1)-simplex. For minimising ``sign * costs``.
+        Row is "coverage", "volume" or the vertices of an interior (d-1)-simplex. For minimising ``sign * costs``.
+    cuts : list of dict
+        Family, simplices, coefficients, rhs, multiplier and proof of each cut that takes part.
+    symmetries : list of list of int, or None
+        Permutations of the points, as the images of 0, 1, ... Then a row stands for all its images, which have the same
+        multiplier, and a cut for the mean of its images.
+    volume_coefficient : int or None
+        Which coefficient of the volumes, on the basis of their number field, the volume row takes.
     reason : str or None
     """
 
@@ -86,6 +93,8 @@ class Certificate:
     flag: list[int] | None = None
     multipliers: list[list[Any]] | None = None
     cuts: list[Any] = field(default_factory=list)
+    symmetries: list[list[int]] | None = None
+    volume_coefficient: int | None = None
     reason: str | None = None
 
 

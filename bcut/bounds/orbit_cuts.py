@@ -12,7 +12,7 @@ a point that is constant on orbits: if that point violates no link cut there, th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import gcd
 from typing import Any, Literal
@@ -63,12 +63,18 @@ class OrbitCut:
     coefficients : ndarray of int64, shape (k,)
     row : ndarray of int64, shape (m,)
         The averaged cut: ``row @ X <= 0``.
+    factor : Fraction
+        The row, times this, is the mean of the images of the cut under the group.
+    proof : mapping
+        Why the cut is valid, as `bcut.separators.link` gives it.
     """
 
     face: tuple[int, ...]
     simplices: NDArray[np.int64]
     coefficients: NDArray[np.int64]
     row: NDArray[np.int64]
+    factor: Fraction
+    proof: Any
 
 
 class OrbitLinks:
@@ -103,20 +109,23 @@ class OrbitLinks:
             if cut is not None and cut.coefficients is not None:
                 columns = np.asarray(cut.simplices)
                 coefficients = np.asarray(cut.coefficients, dtype=np.int64)
-                row = self._averaged(item, columns, coefficients)
+                row, factor = self._averaged(item, columns, coefficients)
                 if row @ point > 0:
                     face = tuple(item.star.face.tolist())
-                    cuts.append(OrbitCut(face, item.simplices[columns], coefficients, row))
+                    simplices = item.simplices[columns]
+                    cuts.append(OrbitCut(face, simplices, coefficients, row, factor, cut.proof))
         return cuts
 
     def _averaged(
         self, item: OrbitStar, columns: NDArray[np.int64], coefficients: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    ) -> tuple[NDArray[np.int64], Fraction]:
+        """Return the coprime row, and what it takes to make it the mean of the images."""
         orbit_of = np.empty(len(item.simplices), dtype=np.int64)
         orbit_of[item.star.columns] = item.orbits
         row = np.zeros(len(self.formulation.simplices), dtype=np.int64)
         np.add.at(row, orbit_of[columns], coefficients * self.stabilisers[orbit_of[columns]])
-        return row // max(1, gcd(*row.tolist()))
+        divisor = max(1, gcd(*row.tolist()))
+        return row // divisor, Fraction(divisor, self.formulation.orbits.group.order)
 
 
 def orbit_stars(formulation: OrbitFormulation) -> list[OrbitStar]:
@@ -197,20 +206,24 @@ def orbit_root_with_cuts(
     import scipy.sparse as sp
 
     links = OrbitLinks(formulation)
-    cuts: list[OrbitCut] = []
     slack_for: list[int] = []
     values: list[float] = []
     status: Literal["dry", "rounds", "infeasible", "limit"] = "rounds"
     current = formulation
-    for _ in range(rounds + 1):
-        left = None if seconds is None else seconds()
-        root = orbit_root(current, objective, seconds=left)
-        if root.status != "optimal" or root.point is None or root.lp is None or root.bound is None:
-            return OrbitCutRoot(
-                "infeasible" if root.status == "infeasible" else "limit", values, current, cuts, root
-            )
+    cuts: list[OrbitCut] = []
+    best = OrbitCutRoot("limit", values, formulation, [], OrbitRoot("limit"))
+    for number in range(rounds + 1):
+        root = orbit_root(current, objective, seconds=None if seconds is None else seconds())
+        if root.status != "optimal":
+            # A limit leaves the last relaxation that was solved.
+            last = root if root.status == "infeasible" else best.root
+            return replace(best, status=root.status, root=last)
+        assert root.point is not None
+        assert root.lp is not None
+        assert root.bound is not None
         values.append(root.lp)
-        if goal is not None and root.bound.value > goal:
+        best = OrbitCutRoot(status, values, current, cuts, root)
+        if number == rounds or (goal is not None and root.bound.value > goal):
             break
         found = links.separate(root.point)
         if not found:
@@ -221,12 +234,10 @@ def orbit_root_with_cuts(
         slack_for = [slack_for[i] for i in kept] + [0] * len(found)
         current = formulation.with_cuts(sp.csr_matrix(np.array([cut.row for cut in cuts])))
     if method == "interior":
-        inner = orbit_root(
-            current, objective, method="interior", seconds=None if seconds is None else seconds()
-        )
-        if inner.status == "optimal":
-            root = inner
-    return OrbitCutRoot(status, values, current, cuts, root)
+        left = None if seconds is None else seconds()
+        inner = orbit_root(best.formulation, objective, method="interior", seconds=left)
+        best = replace(best, root=inner if inner.status == "optimal" else best.root)
+    return replace(best, status=status)
 
 
 def _kept(cuts: list[OrbitCut], slack_for: list[int], point: NDArray[Any]) -> list[int]:

@@ -66,6 +66,8 @@ class OrbitFormulation:
         One coefficient of the volumes of the representatives, up to a common factor.
     volume : int
         The same of the hull; positive.
+    volume_coefficient : int
+        Which coefficient it is, on the basis of the coordinates' field.
     cuts : scipy.sparse.csr_matrix of int64, shape (cuts, m), or None
         Valid inequalities ``cuts @ X <= 0``.
     """
@@ -79,6 +81,7 @@ class OrbitFormulation:
     row_faces: NDArray[np.int64]
     volumes: NDArray[Any]
     volume: int
+    volume_coefficient: int = 0
     cuts: sp.csr_matrix | None = None
 
     @property
@@ -132,7 +135,7 @@ def orbit_formulation(orbits: SimplexOrbits, *, spanning: bool = False) -> Orbit
     matrix = sp.csr_matrix((values, (numbers, columns)), shape=(len(used), len(simplices)), dtype=np.int8)
     matrix.eliminate_zeros()
     kept = np.flatnonzero(np.diff(matrix.indptr))
-    coefficients, total = _volume_row(
+    coefficients, total, place = _volume_row(
         volumes(configuration, simplices), hull_volume(configuration, orbits.hull_facets)
     )
     return OrbitFormulation(
@@ -145,6 +148,7 @@ def orbit_formulation(orbits: SimplexOrbits, *, spanning: bool = False) -> Orbit
         row_faces=orbits.facets[used[kept]],
         volumes=coefficients,
         volume=total,
+        volume_coefficient=place,
     )
 
 
@@ -193,7 +197,7 @@ def _empty(orbits: SimplexOrbits) -> NDArray[np.bool_]:
     return empty
 
 
-def _volume_row(coefficients: NDArray[Any], volume: NDArray[Any]) -> tuple[NDArray[Any], int]:
+def _volume_row(coefficients: NDArray[Any], volume: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
     """Choose a coefficient in which the hull's volume does not vanish, and divide by the common divisor."""
     place = max(range(len(volume)), key=lambda k: abs(int(volume[k])))
     # In the field, a coefficient of a positive number may be negative.
@@ -203,4 +207,4 @@ def _volume_row(coefficients: NDArray[Any], volume: NDArray[Any]) -> tuple[NDArr
     divisor = gcd(total, *row)
     reduced = [value // divisor for value in row]
     dtype = np.int64 if max(map(abs, reduced), default=0) < _INT64 else object
-    return np.array(reduced, dtype=dtype), total // divisor
+    return np.array(reduced, dtype=dtype), total // divisor, place

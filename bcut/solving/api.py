@@ -247,10 +247,8 @@ class _Run:
     def certificate(self) -> Certificate:
         """Write out the multipliers of the exact bound without cuts."""
         exact = self.search.exact
-        if self.method == "orbits":
-            return Certificate(
-                reason="the bound was proven over orbits of simplices; its multipliers are not written"
-            )
+        if self.search.certificate is not None:
+            return self.search.certificate
         if exact is None:
             return Certificate(reason="no relaxation was solved to optimality outside SCIP")
         return make_certificate(self.search.whole.formulation, self.search.whole.objective, exact)

@@ -16,6 +16,7 @@ from bcut.formulations.partial_cocircuits import partial_cocircuit_formulation
 from bcut.geometry.partial_chirotope import PartialChirotope
 from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import make_objective
+from bcut.solving.certificates import make_orbit_certificate
 from bcut.solving.invariant_search import find_invariant_triangulation
 from bcut.solving.orbit_stage import OrbitStage
 from bcut.solving.search import Part, Search, branch
@@ -65,6 +66,7 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
         return stage
     search.lp = search.lp_after_cuts = root.lp
     search.raise_bound(root.bound.value)
+    search.certificate = make_orbit_certificate(stage)
     search.report("orbits", lp=root.lp)
     n, d = stage.configuration.n, stage.configuration.dimension
     if cuts and not is_optimal(search) and comb(n, d - 1) <= _MOST_FACES:
@@ -74,6 +76,7 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
         assert stage.root.bound is not None
         search.lp_after_cuts = stage.root.lp
         search.raise_bound(stage.root.bound.value)
+        search.certificate = make_orbit_certificate(stage)
         search.report("orbits", lp=stage.root.lp)
     return stage
 

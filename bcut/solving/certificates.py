@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.result import Certificate
+from bcut.solving.orbit_stage import OrbitStage
 
 
 def make_certificate(formulation: Formulation, objective: Objective, bound: SafeBound) -> Certificate:
@@ -28,4 +31,46 @@ def make_certificate(formulation: Formulation, objective: Objective, bound: Safe
         bound=str(objective.sign * bound.value),
         flag=formulation.chirotope.bases[0].tolist(),
         multipliers=multipliers,
+    )
+
+
+def make_orbit_certificate(stage: OrbitStage) -> Certificate:
+    """Write out the multipliers of a bound over orbits, those of averaged cuts included.
+
+    Parameters
+    ----------
+    stage : OrbitStage
+    """
+    bound, formulation = stage.root.bound, stage.formulation
+    if bound is None:
+        return Certificate(reason="the relaxation over orbits was not solved to optimality")
+    rows = len(formulation.row_faces)
+    multipliers: list[list[object]] = [
+        ["volume", str(Fraction(bound.coverage * formulation.volume, bound.denominator))]
+    ]
+    for face, multiplier in zip(
+        formulation.row_faces.tolist(), bound.multipliers[:rows].tolist(), strict=True
+    ):
+        if multiplier:
+            multipliers.append([face, str(Fraction(multiplier, bound.denominator))])
+    cuts = [
+        {
+            "family": "link",
+            "simplices": cut.simplices.tolist(),
+            "coefficients": cut.coefficients.tolist(),
+            "rhs": 0,
+            "multiplier": str(Fraction(multiplier, bound.denominator) / cut.factor),
+            "proof": cut.proof,
+        }
+        for cut, multiplier in zip(stage.cuts, bound.multipliers[rows:].tolist(), strict=True)
+        if multiplier
+    ]
+    return Certificate(
+        bound=str(stage.objective.sign * bound.value),
+        # An affine basis: the vertices of any simplex.
+        flag=formulation.simplices[0].tolist(),
+        multipliers=multipliers,
+        cuts=cuts,
+        symmetries=stage.group.generators.tolist(),
+        volume_coefficient=formulation.volume_coefficient,
     )

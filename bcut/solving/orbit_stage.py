@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.orbit_cuts import orbit_root_with_cuts
+from bcut.bounds.orbit_cuts import OrbitCut, orbit_root_with_cuts
 from bcut.bounds.orbit_root import OrbitRoot, orbit_root
 from bcut.errors import TooLargeError
 from bcut.formulations.formulation import Formulation
@@ -44,6 +44,8 @@ class OrbitStage:
     objective : Objective
         Of the representatives.
     root : OrbitRoot
+    cuts : tuple of OrbitCut
+        Those in the formulation.
     """
 
     configuration: PointConfiguration
@@ -51,6 +53,7 @@ class OrbitStage:
     formulation: OrbitFormulation
     objective: Objective
     root: OrbitRoot
+    cuts: tuple[OrbitCut, ...] = ()
 
     def columns_within(self, target: Fraction) -> int:
         """Count the simplices that a triangulation with ``sign * objective <= target`` may use."""
@@ -74,7 +77,7 @@ class OrbitStage:
             or found.root.bound.value <= self.root.bound.value
         ):
             return self
-        return replace(self, formulation=found.formulation, root=found.root)
+        return replace(self, formulation=found.formulation, root=found.root, cuts=tuple(found.cuts))
 
     def residual(self, target: Fraction, *, limit: int = MAX_COLUMNS) -> tuple[Formulation, Objective]:
         """Write down the program on the simplices that a triangulation within the target may use.

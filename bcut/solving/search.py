@@ -17,8 +17,9 @@ from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import Objective
-from bcut.result import Status
+from bcut.result import Certificate, Status
 from bcut.separation.driver import FamilyStatistics, Separation
+from bcut.separation.observer import CutObserver
 from bcut.separation.seam import Problem, Separator
 
 Progress = Callable[[dict[str, Any]], None]
@@ -69,6 +70,8 @@ class Search:
         Proven bound on ``sign * objective``.
     exact : SafeBound or None
         Exact bound of the relaxation of the whole, without cuts.
+    certificate : Certificate or None
+        Of a bound over orbits.
     """
 
     whole: Part
@@ -76,10 +79,12 @@ class Search:
     deadline: float | None = None
     seed: int = 0
     on_progress: Progress | None = None
+    cut_observer: CutObserver | None = None
     status: Status = "limit"
     columns: NDArray[np.intp] | None = None
     bound: Fraction | None = None
     exact: SafeBound | None = None
+    certificate: Certificate | None = None
     lp: float | None = None
     lp_after_cuts: float | None = None
     root_is_integral: bool | None = None
@@ -136,7 +141,9 @@ class Search:
         separators = self.make_separators()
         if not separators:
             return None
-        return Separation(separators, Problem(part.formulation), statistics=self.statistics)
+        return Separation(
+            separators, Problem(part.formulation), statistics=self.statistics, observer=self.cut_observer
+        )
 
 
 def place(search: Search) -> None:

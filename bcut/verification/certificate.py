@@ -53,6 +53,14 @@ class CertificateData:
     cocircuits : mapping of tuple of int to Fraction
         Multipliers of the rows of ascending (d-1)-simplices.
     cuts : tuple of CertificateCut
+    symmetries : tuple of tuple of int, or None
+        Permutations of the points. Where this is not None, multipliers are those of all images of a row, those of cuts
+        belong to the means of their images, and the volume row takes the place of the coverage row (see
+        `bcut.verification.orbit_certificate`).
+    volume : Fraction
+        Multiplier of the volume row.
+    volume_coefficient : int
+        Which coefficient of the volumes, on the basis of the coordinates' number field, the volume row takes.
     reason : str
         Why there is no bound.
     """
@@ -62,6 +70,9 @@ class CertificateData:
     coverage: Fraction = Fraction(0)
     cocircuits: Mapping[Simplex, Fraction] | None = None
     cuts: tuple[CertificateCut, ...] = ()
+    symmetries: tuple[Simplex, ...] | None = None
+    volume: Fraction = Fraction(0)
+    volume_coefficient: int = 0
     reason: str = ""
 
 
@@ -129,27 +140,30 @@ def certified_bound(
             None, obstacle=f"there are {subsets:,} subsets of {points.dimension + 1} points to look at"
         )
     sides = SideTable(points)
+    check_flag(sides, certificate.flag)
     _check_rows(sides, certificate)
-    unknown = sorted(
-        {cut.family for cut in certificate.cuts if cut.multiplier and cut.family not in CUT_CHECKERS}
-    )
-    if unknown:
-        return CertifiedBound(None, obstacle=f"it uses cuts that cannot be re-checked ({', '.join(unknown)})")
-    _check_cuts(sides, certificate)
+    obstacle = check_cuts(sides, certificate)
+    if obstacle:
+        return CertifiedBound(None, obstacle=obstacle)
     found = _Program(sides, certificate, costs, 1 if sense == "min" else -1, spanning).solve()
-    claim = certificate.bound
     assert found.bound is not None
-    if claim is not None and (found.bound < claim if sense == "min" else found.bound > claim):
-        raise VerificationError(
-            f"the certificate claims the bound {claim}, but its multipliers prove {found.bound} only "
-            f"({'at least' if sense == 'min' else 'at most'} {float(found.bound):.6g})"
-        )
+    check_claim(certificate, found.bound, sense)
     return found
 
 
-def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
+def check_claim(certificate: CertificateData, proven: Fraction, sense: str) -> None:
+    """Refuse a certificate that proves less than it claims."""
+    claim = certificate.bound
+    if claim is not None and (proven < claim if sense == "min" else proven > claim):
+        raise VerificationError(
+            f"the certificate claims the bound {claim}, but its multipliers prove {proven} only "
+            f"({'at least' if sense == 'min' else 'at most'} {float(proven):.6g})"
+        )
+
+
+def check_flag(sides: SideTable, flag: Simplex) -> None:
+    """Refuse a flag that is no list of d + 1 affinely independent points."""
     n, d = sides.points.n, sides.points.dimension
-    flag = certificate.flag
     if len(set(flag)) != d + 1 or len(flag) != d + 1 or not all(0 <= v < n for v in flag):
         raise VerificationError(
             f"the certificate's flag {list(flag)} is not a list of {d + 1} different points"
@@ -158,6 +172,10 @@ def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
         raise VerificationError(
             f"the certificate's flag {list(flag)} lies in a hyperplane: it gives no generic point"
         )
+
+
+def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
+    n, d = sides.points.n, sides.points.dimension
     for facet in certificate.cocircuits or {}:
         if len(facet) != d or not all(0 <= v < n for v in facet):
             raise VerificationError(f"the certificate's row {list(facet)} does not name {d} points")
@@ -169,7 +187,13 @@ def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
             )
 
 
-def _check_cuts(sides: SideTable, certificate: CertificateData) -> None:
+def check_cuts(sides: SideTable, certificate: CertificateData) -> str:
+    """Refuse cuts that are not valid; return why they cannot be checked, or nothing."""
+    unknown = sorted(
+        {cut.family for cut in certificate.cuts if cut.multiplier and cut.family not in CUT_CHECKERS}
+    )
+    if unknown:
+        return f"it uses cuts that cannot be re-checked ({', '.join(unknown)})"
     n, d = sides.points.n, sides.points.dimension
     for number, cut in enumerate(certificate.cuts):
         if not cut.multiplier:
@@ -186,6 +210,7 @@ def _check_cuts(sides: SideTable, certificate: CertificateData) -> None:
             CUT_CHECKERS[cut.family](sides, cut)
         except VerificationError as error:
             raise VerificationError(f"{where} is not valid: {error}") from None
+    return ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,7 +123,7 @@ class ExactPoints:
             return -1
         if not error:
             return 0
-        return sum((self._exact_value(plane, i) for i in points), AlgebraicNumber.of(self._field, 0)).sign()
+        return sum((self.value(plane, i) for i in points), AlgebraicNumber.of(self._field, 0)).sign()
 
     def sides(self, plane: Hyperplane) -> tuple[int, int]:
         """Return the points strictly on the + side and those strictly on the - side, as bit sets."""
@@ -143,14 +143,15 @@ class ExactPoints:
 
     def volume(self, simplex: Simplex) -> Any:
         """Return the exact volume of a simplex in units of `volume_unit`; zero if it is flat."""
-        return abs(self._exact_value(self.hyperplane(simplex[:-1]), simplex[-1]))
+        return abs(self.value(self.hyperplane(simplex[:-1]), simplex[-1]))
 
     @property
     def _field(self) -> Any:
         assert self._exact is not None
         return self._exact[0][0].field
 
-    def _exact_value(self, plane: Hyperplane, point: int) -> Any:
+    def value(self, plane: Hyperplane, point: int) -> Any:
+        """Return the exact value of the linear form at a point, in the units that the form is written in."""
         if self._exact is None:
             return sum(map(mul, plane.normal, self._integers[point])) - plane.offset
         if plane.exact is None:

@@ -273,34 +273,47 @@ class _Reader:
         if bound is None:
             reason = value.get("reason")
             return CertificateData(None, reason=reason if isinstance(reason, str) else "")
-        coverage, cocircuits = self.multipliers(self.entry(value, f"{where}.multipliers"))
+        symmetries = self.symmetries(value.get("symmetries"), f"{where}.symmetries")
+        row = "coverage" if symmetries is None else "volume"
+        named, cocircuits = self.multipliers(self.entry(value, f"{where}.multipliers"), row)
         cuts = self.list_of(value.get("cuts", []), f"{where}.cuts", "this is a list of cuts")
         return CertificateData(
             bound=self.rational(bound, f"{where}.bound"),
             flag=tuple(self.vertices(self.entry(value, f"{where}.flag"), f"{where}.flag")),
-            coverage=coverage,
+            coverage=Fraction(0) if symmetries is not None else named,
+            volume=Fraction(0) if symmetries is None else named,
             cocircuits=cocircuits,
+            symmetries=symmetries,
+            volume_coefficient=self.integer(
+                value.get("volume_coefficient") or 0, f"{where}.volume_coefficient"
+            ),
             cuts=tuple(self.cut(cut, f"{where}.cuts[{index}]") for index, cut in enumerate(cuts)),
         )
 
-    def multipliers(self, value: Any) -> tuple[Fraction, dict[Simplex, Fraction]]:
-        """Read the multipliers of the coverage row and of the cocircuit rows."""
-        coverage: Fraction | None = None
+    def multipliers(self, value: Any, named: str) -> tuple[Fraction, dict[Simplex, Fraction]]:
+        """Read the multipliers of the one row with a name, and of the cocircuit rows."""
+        of_named: Fraction | None = None
         cocircuits: dict[Simplex, Fraction] = {}
         for index, entry in enumerate(self.list_of(value, "certificate.multipliers", "this is a list")):
             where = f"certificate.multipliers[{index}]"
             row, text = self.pair(entry, where, "this is a pair of a row and its multiplier")
             multiplier = self.rational(text, where)
-            if row == "coverage":
-                if coverage is not None:
-                    self.refuse(where, "each row has one multiplier", entry)
-                coverage = multiplier
-                continue
-            facet = self.ascending(row, where)
-            if facet in cocircuits:
+            facet = None if row == named else self.ascending(row, where)
+            if facet in cocircuits or (facet is None and of_named is not None):
                 self.refuse(where, "each row has one multiplier", entry)
-            cocircuits[facet] = multiplier
-        return coverage or Fraction(0), cocircuits
+            if facet is None:
+                of_named = multiplier
+            else:
+                cocircuits[facet] = multiplier
+        return of_named or Fraction(0), cocircuits
+
+    def symmetries(self, value: Any, where: str) -> tuple[Simplex, ...] | None:
+        if value is None:
+            return None
+        listed = self.list_of(value, where, "this is a list of permutations of the points")
+        return tuple(
+            tuple(self.vertices(permutation, f"{where}[{i}]")) for i, permutation in enumerate(listed)
+        )
 
     def cut(self, value: Any, where: str) -> CertificateCut:
         if not isinstance(value, Mapping):

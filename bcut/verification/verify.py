@@ -19,6 +19,7 @@ from bcut.verification.consistency import (
 )
 from bcut.verification.costs import Costs, costs_of_objective
 from bcut.verification.exact_points import ExactPoints
+from bcut.verification.orbit_certificate import MAX_TABLE, certified_orbit_bound, is_invariant
 from bcut.verification.reading import ResultData, Source, load_result
 from bcut.verification.triangulation import check_triangulation
 
@@ -51,16 +52,17 @@ class Verification:
     checks: list[str] = field(default_factory=list)
 
 
-def verify(result: Source, *, max_subsets: int = MAX_SUBSETS) -> Verification:
+def verify(result: Source, *, max_subsets: int | None = None) -> Verification:
     """Re-check a result exactly, without any solver and without the model that found it.
 
     Parameters
     ----------
     result : mapping, Result or path
         The data of a result file, what `bcut.solve` returned, or where the file is.
-    max_subsets : int
-        Certificates are re-computed only where at most so many (d+1)-subsets of the points have to be
-        looked at; for larger configurations the statement says that this was left out.
+    max_subsets : int, optional
+        Certificates are re-computed only where at most so many sets of points have to be looked at (of d + 1 points, or
+        of d points where the certificate uses symmetries and no cuts); for larger configurations the statement says
+        that this was left out.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def verify(result: Source, *, max_subsets: int = MAX_SUBSETS) -> Verification:
 class _Verifier:
     """One verification: what is known so far."""
 
-    def __init__(self, data: ResultData, max_subsets: int) -> None:
+    def __init__(self, data: ResultData, max_subsets: int | None) -> None:
         self.data, self.max_subsets = data, max_subsets
         self.checks: list[str] = []
 
@@ -161,15 +163,29 @@ class _Verifier:
         data = self.data
         if data.certificate is None or data.certificate.bound is None:
             return None
-        certified = certified_bound(
-            points,
-            data.certificate,
-            costs,
-            sense=data.sense,
-            spanning=data.spanning,
-            max_subsets=self.max_subsets,
-        )
+        symmetries = data.certificate.symmetries
+        if symmetries is not None:
+            certified = certified_orbit_bound(
+                points,
+                data.certificate,
+                costs,
+                invariant=lambda: is_invariant(data.objective, data.costs, symmetries),
+                sense=data.sense,
+                spanning=data.spanning,
+                max_table=MAX_TABLE if self.max_subsets is None else self.max_subsets,
+            )
+        else:
+            certified = certified_bound(
+                points,
+                data.certificate,
+                costs,
+                sense=data.sense,
+                spanning=data.spanning,
+                max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+            )
         if certified.bound is not None:
+            if symmetries:
+                self.checks.append(f"{len(symmetries)} permutations of the points are affine symmetries")
             self.checks.append(
                 f"the multipliers prove the bound {shown(certified.bound)} "
                 f"over {certified.candidates:,} candidate simplices"
