@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from bcut.solving.api import solve as solve
     from bcut.solving.export import export as export
     from bcut.solving.information import info as info
+    from bcut.solving.regularity import regular as regular
     from bcut.verification.verify import verify as verify
 
 _HOMES = {
@@ -47,6 +48,7 @@ _HOMES = {
     "info": "bcut.solving.information",
     "load_instance": "bcut.instance",
     "plot": "bcut.plotting.plot",
+    "regular": "bcut.solving.regularity",
     "solve": "bcut.solving.api",
     "verify": "bcut.verification.verify",
     "write_points": "bcut.files.registry",

@@ -33,6 +33,18 @@ class SeparatorLoadError(InputError):
     """A separator that cannot be found, imported or given these parameters."""
 
 
+class PlanError(InputError):
+    """A plan of an experiment, or a collection of instances, that cannot be used as written."""
+
+
+class ExperimentError(InputError):
+    """A folder of an experiment that cannot be used: nothing in it, or another process at work there."""
+
+
+class LedgerError(InputError):
+    """A ledger of cuts that cannot be read, or that belongs to another schema."""
+
+
 class SeparatorError(BcutError):
     """A separator that raised, or handed back something that is no cut.
 
@@ -49,6 +61,29 @@ class SeparatorError(BcutError):
     def __init__(self, separator: str, message: str, trace: str = "") -> None:
         super().__init__(f"separator '{separator}': {message}")
         self.separator = separator
+        self.trace = trace
+
+
+class ObjectiveLoadError(InputError):
+    """A user's objective that cannot be found."""
+
+
+class ObjectiveError(BcutError):
+    """A user's objective that raised, or handed back something else than a finite cost for each simplex.
+
+    Attributes
+    ----------
+    objective : str
+        As the user wrote it.
+    trace : str
+        The function's own traceback, as text; empty when it returned something malformed.
+    """
+
+    exit_status = 5
+
+    def __init__(self, objective: str, message: str, trace: str = "") -> None:
+        super().__init__(f"objective '{objective}': {message}")
+        self.objective = objective
         self.trace = trace
 
 

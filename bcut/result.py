@@ -25,8 +25,21 @@ class Instance:
 
 
 @dataclass
+class LevelQuestion:
+    """A further objective of a lexicographic combination; attributes as in `Question`."""
+
+    objective: str
+    sense: str
+    costs: dict[str, Any] | None = None
+
+
+@dataclass
 class Question:
-    """What was asked: the entry ``problem`` of a result file."""
+    """What was asked: the entry ``problem`` of a result file.
+
+    Where `invariant_under` is not None, only triangulations count that one of these groups, each given by generators,
+    leaves invariant. `require` and `forbid` are faces as vertex lists, `star` is a point that all simplices must have.
+    """
 
     objective: str
     sense: str
@@ -37,6 +50,12 @@ class Question:
     limits: dict[str, Any]
     method: str
     costs: dict[str, Any] | None = None
+    then: list[LevelQuestion] = field(default_factory=list)
+    invariant_under: list[list[list[int]]] | None = None
+    dissection: bool = False
+    require: list[list[int]] = field(default_factory=list)
+    forbid: list[list[int]] = field(default_factory=list)
+    star: int | None = None
 
 
 @dataclass
@@ -78,7 +97,8 @@ class Certificate:
     flag : list of int or None
         Ordered vertices that define the generic point of the coverage row.
     multipliers : list of [row, rational] or None
-        Row is "coverage", "volume" or the vertices of an interior (d-1)-simplex. For minimising ``sign * costs``.
+        Row is "coverage", "volume", ``{"flag": vertices}`` for the coverage of another generic point, or the vertices
+        of an interior (d-1)-simplex. For minimising ``sign * costs``.
     cuts : list of dict
         Family, simplices, coefficients, rhs, multiplier and proof of each cut that takes part.
     symmetries : list of list of int, or None
@@ -86,6 +106,17 @@ class Certificate:
         multiplier, and a cut for the mean of its images.
     volume_coefficient : int or None
         Which coefficient of the volumes, on the basis of their number field, the volume row takes.
+    infeasible : bool
+        Whether the multipliers prove that there is no triangulation: a positive bound where all costs are 0.
+    threshold : str or None
+        Of a bottleneck: rational; no triangulation is better. The multipliers then prove it by a positive bound on the
+        number of simplices that are no better than the threshold.
+    earlier : list of str
+        Of a further objective of a lexicographic combination: the multiplier of each earlier objective's value.
+    refutes : dict or None
+        ``{"target": rational, "stages": [{"multipliers": ..., "cuts": ...}, ...]}``: no triangulation reaches the target.
+        Each stage speaks of the simplices whose reduced costs in the one before (first: in this certificate) a
+        triangulation within the target may have; the last one's bound is beyond the target.
     reason : str or None
     """
 
@@ -95,7 +126,25 @@ class Certificate:
     cuts: list[Any] = field(default_factory=list)
     symmetries: list[list[int]] | None = None
     volume_coefficient: int | None = None
+    infeasible: bool = False
+    threshold: str | None = None
+    earlier: list[str] = field(default_factory=list)
+    refutes: dict[str, Any] | None = None
     reason: str | None = None
+
+
+@dataclass
+class LevelRecord:
+    """What was found by a further objective of a lexicographic combination, among the best by those before it.
+
+    Attributes are those of `Result`; status is None where it was not begun.
+    """
+
+    status: Status | None = None
+    value: int | float | None = None
+    bound: int | float | None = None
+    gap: float | None = None
+    certificate: Certificate = field(default_factory=Certificate)
 
 
 @dataclass
@@ -118,6 +167,9 @@ class Result:
         Total and per stage.
     triangulation : list of list of int, or None
         Ascending vertex indices.
+    then : list of LevelRecord
+        One for each of the further objectives, ``problem.then``; `value`, `bound` and `certificate` are those of the
+        first, and `status` is that of all.
     """
 
     instance: Instance
@@ -133,6 +185,7 @@ class Result:
     seconds: dict[str, float] = field(default_factory=dict)
     triangulation: list[list[int]] | None = None
     certificate: Certificate = field(default_factory=Certificate)
+    then: list[LevelRecord] = field(default_factory=list)
     versions: dict[str, str] = field(default_factory=dict)
     schema: int = SCHEMA
 
@@ -148,8 +201,23 @@ class Result:
 
     def to_json(self) -> str:
         """Return the result file as text."""
-        return json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
+        return _readable(self.to_dict()) + "\n"
 
     def save(self, path: str | Path) -> None:
         """Write the result file, whole or not at all."""
         write_text(Path(path), self.to_json())
+
+
+def _readable(value: Any, depth: int = 0) -> str:
+    """Return JSON with a line for each entry; lists of plain values, and what is nested deeper, stay on one line."""
+    parts = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    is_nested = any(isinstance(part, dict | list) for part in parts)
+    is_section = isinstance(value, dict) and depth < 2
+    if not parts or depth == 3 or not (is_nested or is_section):
+        return json.dumps(value, allow_nan=False)
+    indent = " " * (depth + 1)
+    texts = [_readable(part, depth + 1) for part in parts]
+    if isinstance(value, dict):
+        texts = [f"{json.dumps(key)}: {text}" for key, text in zip(value, texts, strict=True)]
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return f"{opening}\n" + ",\n".join(indent + text for text in texts) + f"\n{' ' * depth}{closing}"

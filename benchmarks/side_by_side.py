@@ -1,11 +1,12 @@
-"""`bcut solve` beside TOPCOM's `points2mintriang`, whole processes in turn, on the same points.
+"""`bcut solve` beside TOPCOM's minimum triangulations, `bcut bound` beside polymake's bound: whole processes, in turn.
 
     python benchmarks/side_by_side.py
 
 Times are those of whole processes, the start of Python and its imports included; ratios are of processor time, which
-other work on the machine disturbs least. TOPCOM reads the points exactly as
-`bcut generate --format dat` writes them: the doubles of the sphere as the rationals that they are. Where the points
-have affine symmetries, TOPCOM also runs with generators of their group; `bcut solve` is told of none.
+other work on the machine disturbs least. TOPCOM reads the points exactly as `bcut generate --format dat` writes them:
+the doubles of the sphere as the rationals that they are. Of irrational points it gets the chirotope, which `bcut`
+computes for it. Where the points have affine symmetries, TOPCOM also runs with generators of their group; `bcut solve`
+is told of none. polymake, where it is installed, computes its lower bound for rational points.
 
 A run that the time limit ends counts with the time that it took until then, so its ratio is a lower bound; with `>`.
 """
@@ -23,13 +24,20 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
+from itertools import combinations
 
-from bcut import load_instance
+import numpy as np
+
+from bcut import PointConfiguration, load_instance
 from bcut.files import format_points
+from bcut.geometry.determinants import orientation_signs
 from bcut.geometry.symmetry import symmetry_group
 
-PROGRAMS = ("topcom-points2mintriang", "points2mintriang")
+# What TOPCOM's programs are called, by their input.
+PROGRAMS = {
+    "points": ("topcom-points2mintriang", "points2mintriang"),
+    "chirotope": ("topcom-chiro2mintriang", "chiro2mintriang"),
+}
 # One TOPCOM triangulation is printed as {{0,1,2,4},{1,2,3,7},...}.
 _SIMPLEX = re.compile(r"\{\d[\d,]*\}")
 
@@ -90,30 +98,60 @@ def _processor_time() -> float:
 def _simplices(output: str) -> int | None:
     """Return the size of the triangulation in the output: `bcut`'s JSON object, or TOPCOM's last line."""
     if output.startswith("{"):
-        value: int = json.loads(output)["value"]
+        result = json.loads(output)
+        value: int = result["bound" if result["status"] == "bound" else "value"]
         return value
+    if output.strip().isdecimal():
+        return int(output)
     sizes = [len(_SIMPLEX.findall(line)) for line in output.splitlines() if line.rstrip().endswith("}};")]
     return min(sizes, default=None)
 
 
-def contestants(instance: str, topcom: str) -> list[Contestant]:
-    """Return the commands to compare; `bcut` first."""
+def contestants(instance: str) -> list[Contestant]:
+    """Return the commands that look for a smallest triangulation; `bcut` first."""
     configuration = load_instance(instance)
-    points = format_points(configuration, "dat")
+    kind = "points" if configuration.field.degree == 1 else "chirotope"
+    topcom = next((path for name in PROGRAMS[kind] if (path := shutil.which(name))), None)
     found = [
-        Contestant(f"bcut solve {instance}", [sys.executable, "-m", "bcut", "solve", instance, "--json"]),
-        Contestant("points2mintriang", [topcom], points),
+        Contestant(f"bcut solve {instance}", [sys.executable, "-m", "bcut", "solve", instance, "--json"])
     ]
+    if topcom is None:
+        print(f"# TOPCOM's {PROGRAMS[kind][1]} is not installed (Debian: apt install topcom)", flush=True)
+        return found
+    text = format_points(configuration, "dat") if kind == "points" else _chirotope(configuration)
+    label = PROGRAMS[kind][1]
+    found.append(Contestant(label, [topcom], text))
     group = symmetry_group(configuration)
     if not group.is_trivial:
         generators = [generator.tolist() for generator in group.generators]
-        found.append(Contestant("points2mintriang with symmetries", [topcom], f"{points}{generators}\n"))
+        found.append(Contestant(f"{label} with symmetries", [topcom], f"{text}{generators}\n"))
     return found
 
 
-def compare(instance: str, topcom: str, *, runs: int, limit: float) -> None:
+def bounds(instance: str) -> list[Contestant]:
+    """Return the commands that compute a lower bound; `bcut` first, and none where polymake cannot run."""
+    configuration = load_instance(instance)
+    polymake = shutil.which("polymake")
+    if polymake is None or configuration.field.degree > 1:
+        return []
+    rows = ",".join(f"[1,{','.join(point)}]" for point in configuration.exact_points())
+    script = f"print new Polytope(POINTS=>[{rows}])->SIMPLEXITY_LOWER_BOUND;"
+    return [
+        Contestant(f"bcut bound {instance}", [sys.executable, "-m", "bcut", "bound", instance, "--json"]),
+        Contestant("polymake SIMPLEXITY_LOWER_BOUND", [polymake, script]),
+    ]
+
+
+def _chirotope(configuration: PointConfiguration) -> str:
+    """Return TOPCOM's form of the chirotope: one sign for each (d+1)-subset, in lexicographic order."""
+    n, size = configuration.n, configuration.dimension + 1
+    subsets = np.array(list(combinations(range(n), size)), dtype=np.int64)
+    signs = "".join("-0+"[sign + 1] for sign in orientation_signs(configuration, subsets).tolist())
+    return f"{n},{size}:\n{signs}\n"
+
+
+def compare(instance: str, entrants: list[Contestant], *, runs: int, limit: float) -> None:
     """Run all commands in turn, several times; print medians, and ratios of processor time to that of `bcut`."""
-    entrants = contestants(instance, topcom)
     for _ in range(runs):
         for entrant in entrants:
             # A run that the limit ends says the same every time.
@@ -124,6 +162,8 @@ def compare(instance: str, topcom: str, *, runs: int, limit: float) -> None:
         more = ">" if entrant.ended else ""
         wall, processor = statistics.median(entrant.wall), statistics.median(entrant.processor)
         found = "nothing printed" if entrant.value is None else f"{entrant.value} simplices"
+        if entrant.ended and entrant.value is not None:
+            found += " so far"
         print(
             f"{instance}: {entrant.label}: {found}, {more}{wall:.2f} s, of the processor {more}{processor:.2f} s "
             f"(medians of {len(entrant.wall)}), ratio {more}{processor / base:.3g}",
@@ -137,19 +177,19 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "instances", nargs="*", default=["cube:4", "sphere:16,3,seed=1"], help="what to compare on"
+        "instances",
+        nargs="*",
+        default=["cube:4", "sphere:16,3,seed=1", "icosahedron", "hypersimplex:6,2", "24-cell"],
+        help="what to compare on",
     )
     parser.add_argument("--runs", type=int, default=5, help="runs of every command (default 5)")
     parser.add_argument("--time-limit", type=float, default=300, help="seconds per run (default 300)")
     options = parser.parse_args()
-    topcom = next((path for name in PROGRAMS if (path := shutil.which(name))), None)
-    if topcom is None:
-        sys.exit(
-            f"TOPCOM is missing: none of {', '.join(PROGRAMS)} is on the path (Debian: apt install topcom)"
-        )
-    print(f"# {Path(topcom).name}, at most {options.time_limit:g} s a run", flush=True)
+    print(f"# at most {options.time_limit:g} s a run", flush=True)
     for instance in options.instances:
-        compare(instance, topcom, runs=options.runs, limit=options.time_limit)
+        for entrants in (contestants(instance), bounds(instance)):
+            if len(entrants) > 1:
+                compare(instance, entrants, runs=options.runs, limit=options.time_limit)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import importlib.resources
 from pathlib import Path
 
 # Data that is no point configuration.
-_OTHER = ("known-optima", "-costs")
+_OTHER = ("known-optima", "-costs", "-set")
 
 
 def names() -> list[str]:
@@ -14,8 +14,13 @@ def names() -> list[str]:
     return [name for name in _stems() if not name.endswith(_OTHER)]
 
 
+def collections() -> list[str]:
+    """Names of the bundled collections of instances with known optima, for experiments."""
+    return [name for name in _stems() if name.endswith("-set")]
+
+
 def path(name: str) -> Path:
-    """Path of a bundled JSON file by its name without suffix: an instance, a costs file, "known-optima".
+    """Path of a bundled JSON file by its name without suffix: an instance, a costs file, a collection, "known-optima".
 
     Raises
     ------

@@ -46,6 +46,7 @@ class Clique(Separator):
     """
 
     name: ClassVar[str] = "clique"
+    dissections: ClassVar[bool] = True
 
     def __init__(
         self, *, max_cuts: int = 50, max_nodes: int = 300, effort: int = 300_000, lift: int = 150

@@ -52,6 +52,7 @@ class ConvexPolygon(Separator):
     """
 
     name: ClassVar[str] = "convex-polygon"
+    dissections: ClassVar[bool] = True
 
     def __init__(self, *, max_cuts: int = 50, effort: int = 20_000) -> None:
         if min(max_cuts, effort) < 1:

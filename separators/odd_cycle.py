@@ -49,6 +49,7 @@ class OddCycle(Separator):
     """
 
     name: ClassVar[str] = "odd-cycle"
+    dissections: ClassVar[bool] = True
 
     def __init__(
         self, *, max_cuts: int = 50, backend: str = "scipy", max_nodes: int = 500, lift: int = 150

@@ -169,7 +169,7 @@ TABLE = [
     option("cube:3 --time-limit soon", r"--time-limit", r"'soon' is not a valid float"),
     option("cube:3 --seed -4", r"seed -4", r"not negative"),
     option("cube:3 --sense least", r"--sense", r"'least'", r"min.*max"),
-    option("cube:3 --formulation 9", r"unknown formulation '9'", r"known are 2"),
+    option("cube:3 --formulation 9", r"unknown formulation '9'", r"known are 0, 1, 2, chambers"),
     option("cube:3 --method magic", r"--method", r"auto.*listing.*orbits.*scip"),
     option("cube:3 --objective cardinal", r"unknown objective 'cardinal'", r"did you mean 'cardinality'"),
     option("cube:3 --objective cardinality:3", r"'cardinality' takes no argument", r"'3'"),
@@ -290,7 +290,7 @@ TABLE = [
     Bad(
         "export of an unknown formulation",
         "export cube:3 out.lp --formulation 9",
-        (r"formulation '9'", r"known are 2"),
+        (r"formulation '9'", r"known are 0, 1, 2, chambers"),
     ),
     Bad("export to no folder", "export cube:3 nowhere/out.lp", (r"no folder nowhere", r"make it")),
     Bad("export without a file", "export cube:3", (r"Missing argument 'FILE",)),

@@ -26,6 +26,7 @@ Captured = pytest.CaptureFixture[str]
 
 COMMAND = [sys.executable, "-m", "bcut"]
 HEAVY = {"scipy", "pyscipopt", "networkx", "highspy", "flint", "trimesh", "matplotlib", "rich", "numba"}
+HEAVY |= {"distributed", "dask", "pyarrow", "jinja2"}
 
 RAISING = """
 from bcut import Separator
@@ -82,8 +83,12 @@ def solved(*arguments: str, capsys: Captured, status: int = 0) -> dict[str, Any]
 
 def test_the_commands_are_those_of_the_design() -> None:
     top = {path[0] for path in COMMANDS}
-    assert top == {"solve", "bound", "verify", "separators", "info", "generate", "export", "plot"}
-    assert {path[1] for path in COMMANDS if len(path) > 1} == {"list", "check", "new"}
+    assert top == {
+        "solve", "bound", "verify", "regular", "separators", "objectives", "experiment", "cuts", "info", "generate",
+        "export", "plot",
+    }  # fmt: skip
+    groups = {"list", "check", "new", "run", "report", "show", "replay", "verify"}
+    assert {path[1] for path in COMMANDS if len(path) > 1} == groups
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
@@ -154,7 +159,7 @@ def test_the_library_takes_what_the_command_line_takes(name: str) -> None:
     names = {"file": "path", "separator": "separators"}
     options = {names.get(str(p.name), str(p.name)): p for p in COMMANDS[name,].params}
     only_here = {"no_separators", "output", "as_json", "quiet", "help"}
-    assert set(options) - only_here == set(function) - {"on_progress"}
+    assert set(options) - only_here == set(function) - {"on_progress", "cut_observer"}
     given = ["cube:3", "cube.lp"] if name == "export" else ["cube:3"]
     defaults = COMMANDS[name,].make_context(name, given).params
     for parameter in function.values():
@@ -163,7 +168,7 @@ def test_the_library_takes_what_the_command_line_takes(name: str) -> None:
 
 
 def test_the_library_offers_every_command() -> None:
-    others = {"separators", "generate"}
+    others = {"separators", "objectives", "experiment", "cuts", "generate"}
     assert all(callable(getattr(bcut, path[0])) for path in COMMANDS if path[0] not in others)
     assert callable(bcut.check_separator)
     assert callable(bcut.write_points)

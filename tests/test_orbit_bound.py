@@ -34,6 +34,7 @@ KNOWN = [
     ("grid:3,3", True, 8, 8),
     ("grid:4,4", True, 18, 18),
     ("grid:3,2,2", True, 9, 12),
+    ("grid:3,3,3", True, 35, 48),
     ("cross-polytope:3", False, 4, 4),
     ("cross-polytope:4", False, 8, 8),
     ("cross-polytope:5", False, 16, 16),

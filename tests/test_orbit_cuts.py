@@ -117,7 +117,7 @@ def test_cuts_move_the_bounds_of_symmetric_solids(name: str, sense: str, before:
     assert stage.root.lp == pytest.approx(before, abs=1e-6)
     root = orbit_root_with_cuts(stage.formulation, stage.objective)
     assert root.status == "dry"
-    assert root.values[-1] == pytest.approx(after, abs=1e-6)
+    assert root.rounds[-1].lp == pytest.approx(after, abs=1e-6)
     assert root.root.bound is not None
     assert float(root.root.bound.value) == pytest.approx(stage.objective.sign * after, abs=1e-5)
     cut_stage = stage.with_link_cuts()
@@ -134,7 +134,7 @@ def test_the_bound_is_that_of_the_relaxation_with_all_images_of_the_cuts() -> No
     for limit in (group.order, 6):
         formulation = averaged("dodecahedron", group.reduced(limit))
         objective = Objective("cardinality", "min", np.ones(len(formulation.simplices), dtype=np.int64))
-        assert orbit_root_with_cuts(formulation, objective).values[-1] == pytest.approx(23, abs=1e-6)
+        assert orbit_root_with_cuts(formulation, objective).rounds[-1].lp == pytest.approx(23, abs=1e-6)
 
 
 def test_multipliers_of_cuts_never_help_with_the_wrong_sign() -> None:
@@ -153,6 +153,6 @@ def test_goals_and_limits_stop_the_loop() -> None:
     formulation = averaged("icosidodecahedron")
     objective = Objective("cardinality", "max", np.ones(len(formulation.simplices), dtype=np.int64))
     few = orbit_root_with_cuts(formulation, objective, rounds=2)
-    assert (few.status, len(few.values)) == ("rounds", 3)
+    assert (few.status, len(few.rounds)) == ("rounds", 3)
     reached = orbit_root_with_cuts(formulation, objective, goal=Fraction(-82))
-    assert reached.values[-1] < 82 < reached.values[-2]
+    assert reached.rounds[-1].lp < 82 < reached.rounds[-2].lp

@@ -35,7 +35,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_first_two_commands_stand_for_themselves() -> None:
-    install, tests, _ = blocks("sh")
+    install, tests, *_ = blocks("sh")
     for command in (install, tests):
         assert len(code_lines(command)) == 1
         assert command.startswith("python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt -e ")
@@ -52,6 +52,14 @@ def test_the_command_lines_run(capsys: Captured) -> None:
     assert '"lp_after_cuts": 1.0' in re.sub(r"0\.999999\d+|1\.000000\d+", "1.0", capsys.readouterr().out)
     assert run(verify) == 0
     assert "value 36" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("elsewhere")
+def test_the_objectives_run(capsys: Captured) -> None:
+    (block,) = [block for block in blocks("sh") if "--then" in block]
+    (command,) = code_lines(block)
+    assert run(shlex.split(command)[1:]) == 0
+    assert "optimal (proven)" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("elsewhere")

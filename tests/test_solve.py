@@ -441,7 +441,7 @@ def test_a_separator_that_is_invalid_is_not_believed_for_a_triangulation(
         search.offer(np.array([0, 1, 2]))
         search.status = "optimal"
 
-    monkeypatch.setattr("bcut.solving.api.solve_by_targets", dissection)
+    monkeypatch.setattr("bcut.solving.levels.solve_by_targets", dissection)
     assert len(formulation.simplices) > 3
     with pytest.raises(SolverError, match="cube:3: the solver's answer is no triangulation"):
         bcut.solve("cube:3")

@@ -11,6 +11,7 @@ a point that is constant on orbits: if that point violates no link cut there, th
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.bounds.orbit_root import OrbitRoot, orbit_root
+from bcut.bounds.root import Round
 from bcut.formulations.orbit_cocircuits import OrbitFormulation
 from bcut.geometry.orbits import subset_orbits
 from bcut.geometry.partial_chirotope import PartialChirotope
@@ -31,6 +33,8 @@ from bcut.objectives.objective import Objective
 # Cuts are left out of the program again when they have been slack by more than this for some rounds.
 _SLACK = 1e-7
 _ROUNDS_SLACK = 5
+# Lifting takes some milliseconds for each wedge: too long for stars with more than this.
+_LIFTED = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,22 +94,30 @@ class OrbitLinks:
         from bcut.separators.link import Link
 
         self.formulation = formulation
-        self.link = Link()
+        self.link, self.unlifted = Link(), Link(lift=False)
         self.programs = SmallLps()
         order = formulation.orbits.group.order
         self.stabilisers = order // formulation.sizes
         self.stars = orbit_stars(formulation)
 
-    def separate(self, point: NDArray[np.floating]) -> list[OrbitCut]:
-        """Return the most violated cut of each star, at the sums X of a point over the orbits."""
+    def separate(
+        self, point: NDArray[np.floating], seconds: Callable[[], float] | None = None
+    ) -> list[OrbitCut]:
+        """Return the most violated cut of each star, at the sums X of a point over the orbits.
+
+        When the time is over, the stars that are left are not looked at.
+        """
         from bcut.separators.link import most_violated_weights
 
         shares = np.maximum(point, 0) / self.formulation.sizes
         cuts = []
         for item in self.stars:
+            if seconds is not None and seconds() <= 0:
+                break
             values = shares[item.orbits]
             shortfall, weights = most_violated_weights(item.star, values, self.programs)
-            cut = self.link.cut_of(item.star, values, weights) if shortfall > 1e-6 else None
+            link = self.link if len(item.orbits) <= _LIFTED else self.unlifted
+            cut = link.cut_of(item.star, values, weights) if shortfall > 1e-6 else None
             if cut is not None and cut.coefficients is not None:
                 columns = np.asarray(cut.simplices)
                 coefficients = np.asarray(cut.coefficients, dtype=np.int64)
@@ -145,10 +157,9 @@ def orbit_stars(formulation: OrbitFormulation) -> list[OrbitStar]:
         place = np.minimum(np.searchsorted(known, images, sorter=order), len(known) - 1)
         allowed = known[order[place]] == images
         simplices, numbers = simplices[allowed], order[place][allowed]
-        around = Stars(chirotope, simplices)
-        matches = np.flatnonzero((around.faces == face).all(axis=1))
-        if len(matches):
-            star = around.star(int(matches[0]))
+        around = Stars(chirotope, simplices, around=face)
+        if len(around.faces):
+            star = around.star(0)
             stars.append(OrbitStar(star, simplices, numbers[star.columns]))
     return stars
 
@@ -161,21 +172,24 @@ class OrbitCutRoot:
     ----------
     status : {"dry", "rounds", "infeasible", "limit"}
         Why it ended: no violated cut, the limit on rounds, no point at all, or the time limit.
-    values : list of float
-        LP value of every round, in the sense of the objective.
+    rounds : list of Round
+        LP value of every round, in the sense of the objective, and the cuts that were then added.
     formulation : OrbitFormulation
         With the cuts of the last round.
     cuts : list of OrbitCut
         These, in the order of its rows.
     root : OrbitRoot
         The last relaxation; its bound is proven with these cuts.
+    separating : float
+        Seconds spent on finding cuts.
     """
 
     status: Literal["dry", "rounds", "infeasible", "limit"]
-    values: list[float]
+    rounds: list[Round]
     formulation: OrbitFormulation
     cuts: list[OrbitCut]
     root: OrbitRoot
+    separating: float = 0.0
 
 
 def orbit_root_with_cuts(
@@ -207,12 +221,14 @@ def orbit_root_with_cuts(
 
     links = OrbitLinks(formulation)
     slack_for: list[int] = []
-    values: list[float] = []
+    records: list[Round] = []
+    separating = 0.0
     status: Literal["dry", "rounds", "infeasible", "limit"] = "rounds"
     current = formulation
     cuts: list[OrbitCut] = []
-    best = OrbitCutRoot("limit", values, formulation, [], OrbitRoot("limit"))
+    best = OrbitCutRoot("limit", records, formulation, [], OrbitRoot("limit"))
     for number in range(rounds + 1):
+        started = time.perf_counter()
         root = orbit_root(current, objective, seconds=None if seconds is None else seconds())
         if root.status != "optimal":
             # A limit leaves the last relaxation that was solved.
@@ -221,11 +237,14 @@ def orbit_root_with_cuts(
         assert root.point is not None
         assert root.lp is not None
         assert root.bound is not None
-        values.append(root.lp)
-        best = OrbitCutRoot(status, values, current, cuts, root)
-        if number == rounds or (goal is not None and root.bound.value > goal):
+        best = OrbitCutRoot(status, records, current, cuts, root, separating)
+        wanted = number < rounds and (goal is None or root.bound.value <= goal)
+        before = time.perf_counter()
+        found = links.separate(root.point, seconds) if wanted else []
+        separating += time.perf_counter() - before
+        records.append(Round(root.lp, {"link": len(found)} if found else {}, time.perf_counter() - started))
+        if not wanted:
             break
-        found = links.separate(root.point)
         if not found:
             status = "dry"
             break
@@ -237,7 +256,7 @@ def orbit_root_with_cuts(
         left = None if seconds is None else seconds()
         inner = orbit_root(best.formulation, objective, method="interior", seconds=left)
         best = replace(best, root=inner if inner.status == "optimal" else best.root)
-    return replace(best, status=status)
+    return replace(best, status=status, separating=separating)
 
 
 def _kept(cuts: list[OrbitCut], slack_for: list[int], point: NDArray[Any]) -> list[int]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from math import floor
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -222,7 +223,7 @@ def _lowered(volumes: NDArray[Any], reduced: NDArray[Any]) -> int:
 def _costs(objective: Objective, denominator: int) -> NDArray[Any]:
     """Return ``floor(sign * cost * denominator)``."""
     scale = objective.sign * denominator
-    values = [int(value) * scale // objective.denominator for value in objective.numerators.tolist()]
+    values = [floor(cost * scale) for cost in objective.exact_costs(np.arange(len(objective.numerators)))]
     fits = max(map(abs, values), default=0) < 2**62
     return np.array(values, dtype=np.int64 if fits else object)
 

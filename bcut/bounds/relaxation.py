@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.safe import UNBOUNDED, SafeBound, safe_bound
+from bcut.bounds.safe import SafeBound, safe_bound
 from bcut.errors import SolverError
-from bcut.formulations.formulation import Formulation
+from bcut.formulations.formulation import UNBOUNDED, Formulation
+from bcut.formulations.lazy_rows import LazyRow, violated_rows
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut
 
@@ -22,6 +23,8 @@ from bcut.separation.driver import IntegerCut
 # is faster again.
 _INTERIOR_POINT_FROM = 1500
 _SIMPLEX_ITERATIONS = 0.4
+# Rows of the formulation that are left to be asked for count as violated from this much on.
+_LAZY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,18 +34,22 @@ class RelaxationPoint:
     Attributes
     ----------
     x : ndarray of float, shape (m,)
+        Values of the d-simplices.
     value : float
         ``costs @ x``, unrounded, in the sense of the objective.
     duals : ndarray of float, shape (rows + cuts,)
         For the minimisation of ``sign * costs``.
     slack : ndarray of float, shape (cuts,)
         ``rhs - coefficients @ x`` of the cuts that are in.
+    everything : ndarray of float, shape (width,)
+        Values of all columns of the formulation.
     """
 
     x: NDArray[np.float64]
     value: float
     duals: NDArray[np.float64]
     slack: NDArray[np.float64]
+    everything: NDArray[np.float64]
 
 
 class Relaxation:
@@ -64,7 +71,8 @@ class Relaxation:
         self.deadline = deadline
         self.cuts: list[IntegerCut] = []
         self._unit = float(objective.solver_unit)
-        self._costs = objective.sign * objective.solver_costs
+        self._costs = np.zeros(formulation.width)
+        self._costs[: len(formulation.simplices)] = objective.sign * objective.solver_costs
         self._solver = self._load()
 
     def _load(self) -> Any:
@@ -76,12 +84,11 @@ class Relaxation:
         model.num_col_, model.num_row_ = columns, rows
         model.col_cost_ = self._costs
         model.col_lower_, model.col_upper_ = np.zeros(columns), np.ones(columns)
-        model.row_lower_ = _with_infinities(self.formulation.lower)
-        model.row_upper_ = _with_infinities(self.formulation.upper)
+        entries, model.row_lower_, model.row_upper_ = self.formulation.scaled
         model.a_matrix_.format_ = highspy.MatrixFormat.kRowwise
         model.a_matrix_.start_ = matrix.indptr
         model.a_matrix_.index_ = matrix.indices
-        model.a_matrix_.value_ = matrix.data.astype(float)
+        model.a_matrix_.value_ = entries
         solver = highspy.Highs()
         solver.setOptionValue("output_flag", False)
         solver.setOptionValue("threads", 1)
@@ -94,8 +101,9 @@ class Relaxation:
 
     def restricted_to(self, columns: NDArray[np.integer]) -> Relaxation:
         """Return the relaxation on some of its columns, with its cuts; it is solved from scratch."""
-        place = np.full(len(self.formulation.simplices), -1)
-        place[columns] = np.arange(len(columns))
+        kept = self.formulation.completed(columns)
+        place = np.full(self.formulation.width, -1)
+        place[kept] = np.arange(len(kept))
         smaller = Relaxation(
             self.formulation.restricted_to(columns),
             self.objective.restricted_to(columns),
@@ -181,7 +189,13 @@ class Relaxation:
         activity = np.array(solution.row_value)[base:]
         slack = np.array([cut.rhs for cut in self.cuts]) - activity
         value = self.objective.sign * float(self._costs @ x) * self._unit
-        return RelaxationPoint(x, value, np.array(solution.row_dual) * self._unit, slack)
+        duals = np.array(solution.row_dual) * self._unit
+        return RelaxationPoint(x[: len(self.formulation.simplices)], value, duals, slack, x)
+
+    def missing_rows(self, point: RelaxationPoint) -> list[IntegerCut]:
+        """Return rows of the formulation that are not written down and that a point violates, as cuts."""
+        rows = violated_rows(self.formulation.lazy, point.everything, _LAZY_TOLERANCE)
+        return [as_cut(row) for row in rows]
 
     def _run(self) -> Any:
         """Run HiGHS within the deadline; return the model status."""
@@ -211,7 +225,21 @@ class Relaxation:
             matrix = sp.vstack((matrix.astype(np.int64), rows), format="csr")
             lower = np.concatenate((lower, np.full(len(self.cuts), -UNBOUNDED)))
             upper = np.concatenate((upper, np.array([cut.rhs for cut in self.cuts], dtype=np.int64)))
-        return safe_bound(matrix, lower, upper, self.objective, duals)
+        shifts = formulation.row_shifts
+        if shifts is not None:
+            shifts = np.concatenate((shifts, np.zeros(len(self.cuts), dtype=np.int64)))
+        count = len(formulation.simplices)
+        objective = self.objective
+        if formulation.faces:
+            # Other faces have columns, but cost nothing.
+            free = np.zeros(len(formulation.faces), dtype=objective.numerators.dtype)
+            objective = replace(objective, numerators=np.concatenate((objective.numerators, free)))
+        return safe_bound(matrix, lower, upper, objective, duals, shifts).restricted_to(np.arange(count))
+
+
+def as_cut(row: LazyRow) -> IntegerCut:
+    """Return a row of the formulation in the form in which solvers take rows one by one."""
+    return IntegerCut(row.kind, row.columns, row.coefficients, row.rhs, {})
 
 
 class InfeasibleRelaxationError(Exception):
@@ -220,13 +248,6 @@ class InfeasibleRelaxationError(Exception):
 
 def _answers(statuses: Any) -> tuple[Any, ...]:
     return statuses.kOptimal, statuses.kInfeasible, statuses.kTimeLimit
-
-
-def _with_infinities(sides: NDArray[np.int64]) -> NDArray[np.float64]:
-    values = sides.astype(float)
-    values[sides == UNBOUNDED] = np.inf
-    values[sides == -UNBOUNDED] = -np.inf
-    return values
 
 
 def _run_interruptibly(solver: Any) -> None:

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bcut.bounds.infeasibility import bound_beyond
 from bcut.bounds.relaxation import InfeasibleRelaxationError, Relaxation, RelaxationPoint
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
@@ -59,6 +60,27 @@ class RootLimits:
     target: Fraction | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One step of a proof that nothing reaches a target: a bound on some columns, with cuts.
+
+    Of these columns, only those whose reduced costs the bound leaves within the target matter in the next step. The
+    last step's bound exceeds the target.
+
+    Attributes
+    ----------
+    formulation : Formulation
+        On the columns of the step.
+    bound : SafeBound
+        Multipliers of its rows, then of the cuts.
+    cuts : tuple of IntegerCut
+    """
+
+    formulation: Formulation
+    bound: SafeBound
+    cuts: tuple[IntegerCut, ...]
+
+
 @dataclass
 class RootBound:
     """What the loop found.
@@ -82,6 +104,8 @@ class RootBound:
         The cuts in the last relaxation, over `columns`.
     separation : Separation or None
         The separators, at work on `columns`.
+    stages : list of Stage
+        With a target that turned out to be out of reach: the proof, if the relaxations make one.
     """
 
     columns: NDArray[np.intp]
@@ -95,6 +119,7 @@ class RootBound:
     last: SafeBound | None = None
     point: NDArray[np.float64] | None = None
     cuts: list[IntegerCut] = field(default_factory=list)
+    stages: list[Stage] = field(default_factory=list)
 
 
 class _Loop:
@@ -111,6 +136,7 @@ class _Loop:
         self.result = RootBound(np.arange(len(formulation.simplices)), separation)
         self.slack_for: dict[tuple[bytes, bytes, int], int] = {}
         self.stalled = 0
+        self.best: Stage | None = None
 
     def run(self) -> RootBound:
         result = self.result
@@ -119,13 +145,15 @@ class _Loop:
                 pass
         except InfeasibleRelaxationError:
             result.status = "infeasible"
+            self.best = self._infeasible_stage()
+        self._finish_proof()
         result.cuts = list(self.relaxation.cuts)
         return result
 
     def _step(self) -> bool:
         """Solve, record, separate; tell whether to go on."""
         started = time.perf_counter()
-        point = self.relaxation.solve()
+        point = self._solve()
         if point is None:
             self.result.status = "limit"
             return False
@@ -142,15 +170,27 @@ class _Loop:
         self._shrink()
         return True
 
+    def _solve(self) -> RelaxationPoint | None:
+        """Solve the relaxation with all rows of the formulation, also those that are written when they are needed."""
+        while True:
+            point = self.relaxation.solve()
+            rows = [] if point is None else self.relaxation.missing_rows(point)
+            if not rows:
+                return point
+            self.relaxation.add(rows)
+
     def _record(self, point: RelaxationPoint) -> None:
         result = self.result
         previous = result.lp_after_cuts
         result.point, result.lp_after_cuts = point.x, point.value
+        if result.separation is not None:
+            result.separation.relaxed(point.value)
         bound = self.relaxation.safe_bound(point.duals)
         if result.first is None:
             result.first, result.lp = bound, point.value
         if result.last is None or bound.value >= result.last.value:
             result.last = bound
+            self.best = Stage(self.relaxation.formulation, bound, tuple(self.relaxation.cuts))
         size = self.relaxation.objective.largest_cost
         moved = previous is None or abs(point.value - previous) > self.limits.stall * max(size, abs(previous))
         self.stalled = 0 if moved else self.stalled + 1
@@ -184,7 +224,8 @@ class _Loop:
 
     def _drop_slack(self, point: RelaxationPoint) -> None:
         """Drop cuts that have been slack for some rounds: they only slow the relaxation down."""
-        assert self.result.separation is not None
+        separation = self.result.separation
+        assert separation is not None
         leaving = []
         for position, (cut, slack) in enumerate(zip(self.relaxation.cuts, point.slack, strict=True)):
             age = self.slack_for.get(cut.key, 0) + 1 if slack > _SLACK else 0
@@ -192,7 +233,8 @@ class _Loop:
             if age >= _ROUNDS_SLACK:
                 leaving.append(position)
         for cut in self.relaxation.drop(leaving):
-            self.result.separation.forget(cut)
+            if cut.family in separation.statistics:
+                separation.forget(cut)
             del self.slack_for[cut.key]
 
     def _shrink(self) -> None:
@@ -203,12 +245,32 @@ class _Loop:
         keep = result.last.columns_within(self.limits.target)
         if len(keep) > _SHRINK * len(result.columns):
             return
+        assert self.best is not None
+        result.stages.append(self.best)
         self.relaxation = self.relaxation.restricted_to(keep)
         self.slack_for = {}
         result.separation = result.separation.restricted_to(keep)
         result.columns = result.columns[keep]
         result.point = None if result.point is None else result.point[keep]
         result.last = result.last.restricted_to(keep)
+
+    def _infeasible_stage(self) -> Stage | None:
+        """Return multipliers that prove an infeasible relaxation to be beyond the target."""
+        target = self.limits.target
+        if target is None:
+            return None
+        bound = bound_beyond(self.relaxation, target)
+        return (
+            None if bound is None else Stage(self.relaxation.formulation, bound, tuple(self.relaxation.cuts))
+        )
+
+    def _finish_proof(self) -> None:
+        """Keep the stages only where the last one proves the target to be out of reach."""
+        target, stages = self.limits.target, self.result.stages
+        if target is not None and self.best is not None and self.best.bound.value > target:
+            stages.append(self.best)
+        else:
+            stages.clear()
 
 
 def root_bound(

@@ -17,7 +17,20 @@ from bcut.errors import BcutError
 # Command name -> module with a function of that name; loaded when the command is used or its help is shown.
 _COMMANDS = {
     name: f"bcut.cli.commands.{name}"
-    for name in ("solve", "bound", "verify", "separators", "info", "generate", "export", "plot")
+    for name in (
+        "solve",
+        "bound",
+        "verify",
+        "regular",
+        "separators",
+        "objectives",
+        "experiment",
+        "cuts",
+        "info",
+        "generate",
+        "export",
+        "plot",
+    )
 }
 
 

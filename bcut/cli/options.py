@@ -23,6 +23,19 @@ def _together(*decorators: Decorator[Any]) -> Decorator[Any]:
     return apply
 
 
+def _faces(
+    context: click.Context, parameter: click.Parameter, values: tuple[str, ...]
+) -> tuple[tuple[int, ...], ...]:
+    """Read faces that are written as numbers of points with commas between them."""
+    faces = []
+    for value in values:
+        try:
+            faces.append(tuple(int(part) for part in value.split(",")))
+        except ValueError:
+            raise click.BadParameter(f"'{value}' is no list of points such as 0,1,4") from None
+    return tuple(faces)
+
+
 instance_argument = click.argument("instance")
 
 objective_options = _together(
@@ -30,24 +43,49 @@ objective_options = _together(
         "--objective",
         default="cardinality",
         show_default=True,
-        metavar="NAME",
-        help="What is summed over the simplices: cardinality, costs:FILE, random-costs:SEED.",
+        metavar="NAME|FILE",
+        help="What is summed over the simplices: cardinality, weight, aspect-ratio, dihedral-angle, ... "
+        "(`bcut objectives list`), costs:FILE, random-costs:SEED, or a function of yours, FILE.py or FILE.py:FUNCTION. "
+        "min-max:MEASURE and max-min:MEASURE look at the worst simplex instead.",
     ),
     click.option(
         "--sense",
         type=click.Choice(["min", "max"]),
-        default="min",
-        show_default=True,
-        help="Whether the sum is to be smallest or largest.",
+        help="Whether the sum is to be smallest or largest. Without this option: smallest; min-max and max-min say it "
+        "themselves.",
     ),
     click.option(
         "--formulation",
-        default="2",
-        show_default=True,
         metavar="NAME",
-        help="The integer program: 2, the cocircuit form.",
+        help="The integer program: 0, stable sets of simplices; 1, stable sets of faces of all dimensions; 2, the "
+        "cocircuit form; chambers, set partitioning. Without this option: 2, or chambers for dissections.",
     ),
     click.option("--spanning", is_flag=True, help="Allow only triangulations that use every point."),
+    click.option(
+        "--dissection",
+        is_flag=True,
+        help="Allow simplices that do not meet face to face, as long as they do not overlap.",
+    ),
+    click.option(
+        "--require",
+        multiple=True,
+        metavar="POINTS",
+        callback=_faces,
+        help="Allow only triangulations with this face, such as 0,1,4; of any dimension, repeatable.",
+    ),
+    click.option(
+        "--forbid",
+        multiple=True,
+        metavar="POINTS",
+        callback=_faces,
+        help="Allow only triangulations without this face; of any dimension, repeatable.",
+    ),
+    click.option(
+        "--star",
+        type=int,
+        metavar="POINT",
+        help="Allow only triangulations all of whose simplices have this point as a vertex.",
+    ),
 )
 
 separator_options = _together(
@@ -57,9 +95,19 @@ separator_options = _together(
         multiple=True,
         metavar="NAME|FILE",
         help="A cut family at work, repeatable: a name, a file, each with :parameter=value,... "
-        "(`bcut separators list`). Without this option: link.",
+        "(`bcut separators list`). Without this option: link. With formulations 0 and 1: clique and link; for "
+        "dissections: clique and odd-cycle.",
     ),
     click.option("--no-separators", is_flag=True, help="Put no cut family to work."),
+)
+
+symmetry_options = _together(
+    click.option(
+        "--symmetries",
+        metavar="FILE",
+        help="Work over the orbits of these symmetries instead of all: a file of permutations, [[1,0,2,3],...], or a "
+        "TOPCOM file with generators behind its points. They are checked exactly.",
+    ),
 )
 
 run_options = _together(

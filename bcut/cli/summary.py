@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from bcut.cli.output import table
-from bcut.result import Result
+from bcut.objectives.syntax import BOTTLENECKS
+from bcut.result import Question, Result
 
 _MEANING = {
     "optimal": "optimal (proven)",
@@ -20,16 +21,20 @@ def summary(result: Result, output: Path | None = None) -> str:
     """Return the summary of a result, and where it was written, with a line break at the end."""
     instance, problem, size = result.instance, result.problem, result.size
     head = f"{instance.name}: {len(instance.points)} points in dimension {instance.dimension}\n"
-    kind = "spanning triangulations" if problem.spanning else "triangulations"
+    kind = ("spanning " if problem.spanning else "") + (
+        "dissections" if problem.dissection else "triangulations"
+    )
+    kind += _restrictions(problem)
     columns = f"{size.columns:,} columns, {size.rows:,} rows"
     if size.columns_after_fixing is not None:
         columns += f"; {size.columns_after_fixing:,} columns after fixing"
     rows = [
-        ("problem", f"{problem.sense} {problem.objective} over all {kind}"),
+        ("problem", f"{_asked(problem.objective, problem.sense)} over all {kind}"),
         ("program", f"formulation {problem.formulation}, method {problem.method}: {columns}"),
         ("root LP", f"{_number(result.root.lp)}, after cuts {_number(result.root.lp_after_cuts)}"),
         ("value", _number(result.value)),
         ("bound", _number(result.bound)),
+        *_further(result),
         ("status", _status(result)),
         ("nodes", f"{result.nodes:,}"),
         *_separators(result),
@@ -40,6 +45,31 @@ def summary(result: Result, output: Path | None = None) -> str:
     if output is not None:
         rows.append(("written", str(output)))
     return head + table(rows)
+
+
+def _restrictions(problem: Question) -> str:
+    """Write what a triangulation must have and must not have."""
+    parts = [f"with {','.join(map(str, face))}" for face in problem.require]
+    parts += [f"without {','.join(map(str, face))}" for face in problem.forbid]
+    if problem.star is not None:
+        parts.append(f"that are stars of {problem.star}")
+    return " " + ", ".join(parts) if parts else ""
+
+
+def _asked(objective: str, sense: str) -> str:
+    """Write an objective with its sense, which a bottleneck tells itself."""
+    return objective if objective.partition(":")[0] in BOTTLENECKS else f"{sense} {objective}"
+
+
+def _further(result: Result) -> list[tuple[str, str]]:
+    """Return what the further objectives reached, a line each."""
+    return [
+        (
+            "then",
+            f"{_asked(asked.objective, asked.sense)}: value {_number(found.value)}, bound {_number(found.bound)}",
+        )
+        for asked, found in zip(result.problem.then, result.then, strict=True)
+    ]
 
 
 def _number(value: float | None) -> str:

@@ -83,8 +83,9 @@ class CrossingTable:
 
         Parameters
         ----------
-        simplices : ndarray of int, shape (k, d + 1)
-            Ascending vertices.
+        simplices : ndarray of int, shape (k, s)
+            Ascending vertices; simplices of a smaller dimension too: the extension of a circuit that the module
+            describes needs the vertices of one full-dimensional simplex only, and the fixed ones are.
         """
         d = self.chirotope.dimension
         left = FaceTable(simplices, self.chirotope.n)
@@ -92,7 +93,7 @@ class CrossingTable:
         # once.
         crossing = np.zeros((self.table.count, (left.count + 7) // 8), dtype=np.uint8)
         omitting = self._orientations(left, 0)
-        for size in range(1, d + 2):
+        for size in range(1, simplices.shape[1] + 1):
             keeping = self._orientations(left, size)
             faces = self._crossing_faces(left, size, omitting, keeping)
             if faces.any():

@@ -65,14 +65,32 @@ def determinants(rows: list[list[Any]], multiply: Any = np.multiply) -> Any:
         The determinants. Every intermediate value is a minor, bounded by ``k! * B**k`` for entries bounded by
         B.
     """
-    d = len(rows)
-    minors = {1 << j: rows[0][j] for j in range(d)}
-    for size in range(1, d):
+    return minors(rows, multiply)[(1 << len(rows)) - 1]
+
+
+def minors(rows: list[list[Any]], multiply: Any = np.multiply) -> dict[int, Any]:
+    """Return all maximal minors of matrices with k rows and d >= k columns, by expansion along the rows.
+
+    Parameters
+    ----------
+    rows : list of k lists of d arrays
+        As for `determinants`; at least one row.
+    multiply : callable
+        Product of two entries.
+
+    Returns
+    -------
+    dict
+        From each set of k columns, as the bits of an integer, to the minors on these columns.
+    """
+    d = len(rows[0])
+    found = {1 << j: rows[0][j] for j in range(d)}
+    for size in range(1, len(rows)):
         grown: dict[int, Any] = {}
         for columns in (mask for mask in range(1 << d) if mask.bit_count() == size + 1):
             total = None
             for j in (j for j in range(d) if columns >> j & 1):
-                term = multiply(rows[size][j], minors[columns & ~(1 << j)])
+                term = multiply(rows[size][j], found[columns & ~(1 << j)])
                 # The entry of column j in the last row: its sign is the parity of the columns to its right.
                 negative = (columns >> (j + 1)).bit_count() & 1
                 if total is None:
@@ -80,8 +98,8 @@ def determinants(rows: list[list[Any]], multiply: Any = np.multiply) -> Any:
                 else:
                     total = total - term if negative else total + term
             grown[columns] = total
-        minors = grown
-    return minors[(1 << d) - 1]
+        found = grown
+    return found
 
 
 class _Kernel:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.hull import lie_on_hull
 from bcut.geometry.subsets import all_subsets, ranks
 
 
@@ -82,6 +83,8 @@ class Stars:
     chirotope : Chirotope
     simplices : ndarray of int, shape (m, d + 1)
         Ascending vertices.
+    around : ndarray of int, shape (d - 1,), optional
+        Only the star of this face; all when left out.
 
     Attributes
     ----------
@@ -93,7 +96,13 @@ class Stars:
         The face and the simplex of each wedge, and the points it turns from and to.
     """
 
-    def __init__(self, chirotope: Chirotope, simplices: NDArray[np.int64]) -> None:
+    def __init__(
+        self,
+        chirotope: Chirotope,
+        simplices: NDArray[np.int64],
+        *,
+        around: NDArray[np.integer] | None = None,
+    ) -> None:
         self.chirotope = chirotope
         d = chirotope.dimension
         orientations = chirotope.orientations(simplices)
@@ -107,26 +116,20 @@ class Stars:
             heads.append(np.where(turns_left, simplices[:, j], simplices[:, i]))
         wedge_faces = np.concatenate(face_ranks)
         order = np.argsort(wedge_faces, kind="stable")
-        interior = self._interior_faces()
-        order = order[interior[wedge_faces[order]]]
-        used, self.starts = np.unique(wedge_faces[order], return_index=True)
-        self.starts = np.append(self.starts, len(order))
-        self.faces = all_subsets(chirotope.n, d - 1)[used]
+        if around is not None:
+            order = order[wedge_faces[order] == ranks(np.asarray(around)[None, :], chirotope.n)]
+        used, first = np.unique(wedge_faces[order], return_index=True)
+        faces = all_subsets(chirotope.n, d - 1)[used]
+        interior = ~lie_on_hull(faces, chirotope.hull_facets, chirotope.n)
+        lengths = np.diff(np.append(first, len(order)))
+        order = order[np.repeat(interior, lengths)]
+        used, lengths, self.faces = used[interior], lengths[interior], faces[interior]
+        self.starts = np.concatenate(([0], np.cumsum(lengths)))
         self.columns = np.tile(np.arange(len(simplices)), len(tails))[order]
         self.tails = np.concatenate(tails)[order]
         self.heads = np.concatenate(heads)[order]
         self.face_of = np.repeat(np.arange(len(used)), np.diff(self.starts))
         self._known: dict[int, Star] = {}
-
-    def _interior_faces(self) -> NDArray[np.bool_]:
-        """Tell which (d-2)-faces lie in no facet of the convex hull, by rank."""
-        faces = all_subsets(self.chirotope.n, self.chirotope.dimension - 1)
-        interior = np.ones(len(faces), dtype=bool)
-        for facet in self.chirotope.hull_facets:
-            on_facet = np.zeros(self.chirotope.n, dtype=bool)
-            on_facet[list(facet)] = True
-            interior &= ~on_facet[faces].all(axis=1)
-        return interior
 
     def star(self, number: int) -> Star:
         """Return the star of ``faces[number]``; the angular order is computed once."""

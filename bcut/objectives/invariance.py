@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +13,26 @@ from bcut.geometry.subsets import ranks
 
 # Images of simplices that are looked up at once.
 _CHUNK = 4_000_000
+
+
+def symmetries_of_table(
+    group: PermutationGroup, default: Fraction, table: Mapping[tuple[int, ...], Fraction]
+) -> PermutationGroup:
+    """Return the subgroup that leaves a table of costs invariant.
+
+    Parameters
+    ----------
+    group : PermutationGroup
+    default : Fraction
+        What simplices cost that are not in the table.
+    table : mapping
+        Costs of simplices, by their ascending vertices.
+    """
+    others = sorted(simplex for simplex, cost in table.items() if cost != default)
+    if not others:
+        return group
+    costs = np.array([table[simplex] for simplex in others], dtype=object)
+    return symmetries_of_costs(group, np.array(others, dtype=np.int64), costs)
 
 
 def symmetries_of_costs(

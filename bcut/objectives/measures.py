@@ -1,15 +1,16 @@
-"""Measures of d-simplices, by name. To add one: write a function below and register it.
+"""Measures of d-simplices, by name or from a user's file. To add one: write a function here and register it.
 
-A measure gets the configuration, some of its simplices and the text behind the colon, and returns one cost
-for each: an array of int64, or a list of `Fraction`. Costs that are not rational are rounded to doubles, and
-those are then taken exactly.
+A measure gets the configuration, some of its simplices and the text behind the colon, and returns one cost for each:
+an array of int64, `Ratios`, or an array of doubles, which are taken exactly. The cost of a simplex must not depend on
+which other simplices are asked for: verification asks again. Measures of lengths, volumes and angles are in
+`bcut.objectives.geometric`.
 """
 
 from __future__ import annotations
 
+import difflib
 import json
 import re
-from collections.abc import Callable
 from fractions import Fraction
 from math import comb
 from pathlib import Path
@@ -17,17 +18,26 @@ from sys import float_info
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bcut.errors import InputError
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.subsets import ranks
+from bcut.objectives import geometric  # registers its measures
+from bcut.objectives.registry import MEASURES, Costs, Measure, Simplices, exact, measure, refuse_argument
+from bcut.objectives.syntax import MeasureName
+from bcut.objectives.user import costs_of_function
 
-Simplices = NDArray[np.int64]
-Costs = NDArray[np.int64] | list[Fraction]
-Measure = Callable[[PointConfiguration, Simplices, str], Costs]
-
-MEASURES: dict[str, Measure] = {}
+__all__ = [
+    "MEASURES",
+    "Costs",
+    "Measure",
+    "Simplices",
+    "exact",
+    "geometric",
+    "measure",
+    "measured",
+    "read_costs",
+]
 
 # "source" and "known" are for people.
 _KEYS = {"default", "costs", "source", "known"}
@@ -36,39 +46,70 @@ _KEYS = {"default", "costs", "source", "known"}
 _LONG_EXPONENT = re.compile(r"[eE][+-]?\d{4}")
 
 
-def measure(name: str) -> Callable[[Measure], Measure]:
-    """Register a measure under the name that users write."""
+def measured(text: str, configuration: PointConfiguration, simplices: Simplices) -> Costs:
+    """Evaluate the measure that a user wrote: ``NAME``, ``NAME:ARGUMENT`` or ``FILE.py[:FUNCTION]``.
 
-    def register(function: Measure) -> Measure:
-        MEASURES[name] = function
-        return function
+    Parameters
+    ----------
+    text : str
+    configuration : PointConfiguration
+    simplices : ndarray of int, shape (m, d + 1)
+        Ascending vertices, none flat.
 
-    return register
+    Raises
+    ------
+    InputError
+        If there is no such measure, its argument does not fit, or a cost is beyond the range of doubles.
+    ObjectiveError
+        If a user's function raises, or returns something else than a finite cost for each simplex.
+    """
+    name = MeasureName.parse(text)
+    if name.is_file:
+        return costs_of_function(text, configuration, simplices)
+    if name.source not in MEASURES:
+        near = difflib.get_close_matches(name.source, MEASURES, n=1)
+        hint = (
+            f"did you mean '{near[0]}'?"
+            if near
+            else f"known are {', '.join(sorted(MEASURES))}; a file is given by its path"
+        )
+        raise InputError(f"unknown objective '{name.source}': {hint}")
+    costs = MEASURES[name.source](configuration, simplices, name.argument)
+    if isinstance(costs, np.ndarray) and costs.dtype.kind == "f":
+        beyond = np.flatnonzero(~np.isfinite(costs))
+        if len(beyond):
+            raise InputError(
+                f"objective '{text}': the cost of simplex {simplices[beyond[0]].tolist()} of {configuration.name} is "
+                "beyond the range of float64; scale the points"
+            )
+    return costs
 
 
 @measure("cardinality")
 def cardinality(configuration: PointConfiguration, simplices: Simplices, argument: str) -> Costs:
     """1 for every simplex: the number of simplices."""
-    if argument:
-        raise InputError(f"objective 'cardinality' takes no argument, but got '{argument}'")
+    refuse_argument("cardinality", argument)
     return np.ones(len(simplices), dtype=np.int64)
 
 
 @measure("random-costs")
 def random_costs(configuration: PointConfiguration, simplices: Simplices, argument: str) -> Costs:
-    """Return doubles from ``numpy.random.default_rng(SEED).random(C(n, d+1))``, one per (d+1)-subset in colex order."""
+    """Random numbers from 0 to 1, as random-costs:SEED.
+
+    They are the doubles of ``numpy.random.default_rng(SEED).random(C(n, d+1))``, one per (d+1)-subset in colex order.
+    """
     if not argument.isdecimal():
         raise InputError(
             f"objective 'random-costs:{argument}': write random-costs:SEED with a non-negative integer"
         )
     n = configuration.n
     drawn = np.random.default_rng(int(argument)).random(comb(n, configuration.dimension + 1))
-    return [Fraction(value) for value in drawn[ranks(simplices, n)].tolist()]
+    return drawn[ranks(simplices, n)]
 
 
 @measure("costs")
 def costs_from_file(configuration: PointConfiguration, simplices: Simplices, argument: str) -> Costs:
-    """Costs from a JSON file ``{"default": 1, "costs": [[[0, 1, 2], 0], ...]}``.
+    """Costs from a JSON file {"default": 1, "costs": [[[0, 1, 2], 0], ...]}, as costs:FILE.
 
     Costs are integers, doubles (taken exactly) or rationals as text, "p/q". Simplices that are listed but are
     no candidates (flat, or not empty when only empty ones are allowed) are ignored.

@@ -18,17 +18,17 @@ Simplices = NDArray[np.int64]
 
 # Light colours that differ in brightness too; neighbours get different ones.
 _COLOURS = ("#8fc1e3", "#f4b98a", "#a9d8a0", "#e6a8c9", "#f2dd86", "#bab2e0")
-_INK = "#2b2b33"
+INK = "#2b2b33"
 _SEE_THROUGH = 0.14
 
 # Orthonormal: to the right, up, and towards the viewer.
 _AZIMUTH, _ELEVATION = np.radians(-58.0), np.radians(20.0)
 _RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
-_TOWARDS = np.array(
+TOWARDS = np.array(
     [np.cos(_AZIMUTH) * np.cos(_ELEVATION), np.sin(_AZIMUTH) * np.cos(_ELEVATION), np.sin(_ELEVATION)]
 )
-_UP = np.cross(_TOWARDS, _RIGHT)
-_LIGHT = (_TOWARDS + 0.9 * _UP - 0.5 * _RIGHT) / np.linalg.norm(_TOWARDS + 0.9 * _UP - 0.5 * _RIGHT)
+_UP = np.cross(TOWARDS, _RIGHT)
+_LIGHT = (TOWARDS + 0.9 * _UP - 0.5 * _RIGHT) / np.linalg.norm(TOWARDS + 0.9 * _UP - 0.5 * _RIGHT)
 
 
 def draw_plane(figure: Figure, points: Floats, triangles: Simplices, *, labels: bool) -> None:
@@ -45,12 +45,12 @@ def draw_plane(figure: Figure, points: Floats, triangles: Simplices, *, labels: 
     axes = figure.add_subplot()
     colours = neighbour_colours(triangles)
     axes.add_collection(
-        PolyCollection(list(points[triangles]), facecolors=colours, edgecolors=_INK, linewidths=0.9)
+        PolyCollection(list(points[triangles]), facecolors=colours, edgecolors=INK, linewidths=0.9)
     )
     used = np.isin(np.arange(len(points)), triangles)
-    axes.scatter(points[used, 0], points[used, 1], s=22, color=_INK, zorder=3)
-    axes.scatter(points[~used, 0], points[~used, 1], s=22, facecolor="white", edgecolor=_INK, zorder=3)
-    _finish(axes, points, labels)
+    axes.scatter(points[used, 0], points[used, 1], s=22, color=INK, zorder=3)
+    axes.scatter(points[~used, 0], points[~used, 1], s=22, facecolor="white", edgecolor=INK, zorder=3)
+    finish(axes, points, labels)
 
 
 def draw_space(
@@ -73,23 +73,23 @@ def draw_space(
     corners = corners + explode * (corners.mean(axis=1, keepdims=True) - points.mean(axis=0))
     colours = neighbour_colours(tetrahedra)
     faces, fills = [], []
-    for number in back_to_front(corners, _TOWARDS):
+    for number in back_to_front(corners, TOWARDS):
         for vertex in range(4):
             face = np.delete(corners[number], vertex, axis=0)
             normal = _outer_normal(face, corners[number, vertex])
-            if explode and normal @ _TOWARDS <= 0:
+            if explode and normal @ TOWARDS <= 0:
                 continue
             brightness = 0.72 + 0.28 * max(0.0, float(normal @ _LIGHT))
-            faces.append(_projected(face))
+            faces.append(projected(face))
             shade = [brightness * part for part in to_rgb(colours[number])]
             fills.append((*shade, 1.0 if explode else _SEE_THROUGH))
     axes.add_collection(
-        PolyCollection(faces, facecolors=fills, edgecolors=_INK, linewidths=0.7, joinstyle="round")
+        PolyCollection(faces, facecolors=fills, edgecolors=INK, linewidths=0.7, joinstyle="round")
     )
-    flat = _projected(points)
+    flat = projected(points)
     if not explode:
-        axes.scatter(flat[:, 0], flat[:, 1], s=18, color=_INK, zorder=3)
-    _finish(axes, flat, labels)
+        axes.scatter(flat[:, 0], flat[:, 1], s=18, color=INK, zorder=3)
+    finish(axes, flat, labels)
 
 
 def neighbour_colours(simplices: Simplices) -> list[str]:
@@ -114,7 +114,8 @@ def neighbour_colours(simplices: Simplices) -> list[str]:
     return [_COLOURS[colour] for colour in chosen]
 
 
-def _projected(points: Floats) -> Floats:
+def projected(points: Floats) -> Floats:
+    """Return points of space as the viewer sees them, in the plane."""
     flat: Floats = np.stack((points @ _RIGHT, points @ _UP), axis=-1)
     return flat
 
@@ -125,11 +126,12 @@ def _outer_normal(face: Floats, opposite: Floats) -> Floats:
     return normal if normal @ (opposite - face[0]) < 0 else -normal
 
 
-def _finish(axes: Axes, points: Floats, labels: bool) -> None:
+def finish(axes: Axes, points: Floats, labels: bool) -> None:
+    """Fit the axes to what was drawn, and number the points where that is wanted."""
     if labels:
         for number, point in enumerate(points):
             axes.annotate(
-                str(number), tuple(point), xytext=(4, 4), textcoords="offset points", fontsize=8, color=_INK
+                str(number), tuple(point), xytext=(4, 4), textcoords="offset points", fontsize=8, color=INK
             )
     axes.set_aspect("equal")
     axes.autoscale_view()

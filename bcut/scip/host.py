@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -16,8 +17,11 @@ from bcut.errors import SolverError
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.scip.console import native_output_to_stderr
+from bcut.scip.lazy import LazyRowsHandler
 from bcut.scip.model import build_model
 from bcut.scip.plugins import LpValues, Observer, RootRecord, SeparatorAdapter
+from bcut.scip.root_lp import RootLpWatcher
+from bcut.scip.statistics import SolverStatistics, read_statistics
 from bcut.separation.driver import IntegerCut, Separation
 
 # SCIP's own infinity: the largest time limit that it accepts.
@@ -45,12 +49,18 @@ class TreeOptions:
     unlimited : tuple of str
         Separators of SCIP, such as "zerohalf", that run at the root without a limit on rounds or cuts,
         whether or not the others run.
+    named : tuple of str
+        Separators of SCIP that run at the root within their usual limits, whether or not the others run.
     presolve : bool
     heuristics : bool
     separate_every : int
         Depths between nodes at which our separators run; 0 for the root only.
     root_rounds, tree_rounds : int
         Rounds of our separators per node.
+    plain : bool
+        Leave all parameters of SCIP at their defaults, but for the seed and the limits.
+    statistics : bool
+        Whether to ask SCIP afterwards where its time went.
     """
 
     seconds: float | None = None
@@ -59,11 +69,14 @@ class TreeOptions:
     cutoff: float | None = None
     scip_separators: bool = True
     unlimited: tuple[str, ...] = ()
+    named: tuple[str, ...] = ()
     presolve: bool = True
     heuristics: bool = True
     separate_every: int = 1
     root_rounds: int = 1000
     tree_rounds: int = 5
+    plain: bool = False
+    statistics: bool = False
 
 
 @dataclass
@@ -82,6 +95,11 @@ class TreeResult:
     nodes : int
     rounds : list of Round
         Root relaxations.
+    seconds : float
+    watching : float
+        Those of them that `on_root_lp` took, with what it is shown.
+    solver : SolverStatistics or None
+        Where they were asked for.
     """
 
     status: TreeStatus
@@ -90,6 +108,8 @@ class TreeResult:
     nodes: int
     rounds: list[Round] = field(default_factory=list)
     seconds: float = 0.0
+    watching: float = 0.0
+    solver: SolverStatistics | None = None
 
 
 def branch_and_cut(
@@ -101,6 +121,7 @@ def branch_and_cut(
     cuts: Sequence[IntegerCut] = (),
     start: NDArray[np.integer] | None = None,
     on_progress: Callable[[dict[str, Any]], None] | None = None,
+    on_root_lp: RootLpWatcher | None = None,
 ) -> TreeResult:
     """Solve a formulation with SCIP.
 
@@ -117,6 +138,8 @@ def branch_and_cut(
         Columns of a known triangulation.
     on_progress : callable, optional
         Told of new bounds and incumbents.
+    on_root_lp : callable, optional
+        Shown every relaxation of the root as SCIP solved it, with the rows of all separators.
 
     Raises
     ------
@@ -133,21 +156,29 @@ def branch_and_cut(
     )
     _set_parameters(model, options)
     _set_limits(model, options, time.perf_counter() - started, unit)
-    values = LpValues(variables)
-    record = RootRecord(objective)
+    # Separators and records see the d-simplices only.
+    simplices = variables[: len(formulation.simplices)]
+    values = LpValues(simplices)
+    ours = {separator.name for separator in separation.separators} if separation is not None else set()
+    record = RootRecord(objective, on_root_lp, ours)
     adapter = _include_adapter(model, separation, values, record, options)
-    observer = Observer(values, record, on_progress, unit)
+    observer = Observer(values, record, on_progress, unit, separation)
     model.includeEventhdlr(observer, "bcut-observer", "records root bounds and reports progress")
+    lazy = LazyRowsHandler(formulation.lazy, variables)
+    if formulation.lazy:
+        lazy.include_in(model)
     if start is not None:
-        _add_start(model, variables, start)
+        _add_start(model, variables, formulation.completed(start))
     error = _optimize(model)
-    captured = adapter.error or observer.error
+    captured = adapter.error or observer.error or lazy.error
     if captured is not None:
         raise captured
     if error is not None:
         raise SolverError(f"SCIP failed on {formulation.configuration.name}: {error}") from error
-    result = _collect(model, variables, record, unit)
-    result.seconds = time.perf_counter() - started
+    result = _collect(model, simplices, record, unit)
+    result.seconds, result.watching = time.perf_counter() - started, record.watching
+    if options.statistics:
+        result.solver = read_statistics(model)
     model.freeProb()
     return result
 
@@ -156,6 +187,8 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
     model.setParam("randomization/randomseedshift", options.seed % 2**31)
     # One Ctrl-C stops the search and keeps the incumbent.
     model.setParam("misc/catchctrlc", True)
+    if options.plain:
+        return
     if not options.presolve:
         model.setPresolve(SCIP_PARAMSETTING.OFF)
         model.setParam("presolving/maxrestarts", 0)
@@ -163,8 +196,9 @@ def _set_parameters(model: Model, options: TreeOptions) -> None:
     model.setParam("propagating/probing/maxprerounds", 0)
     if not options.scip_separators:
         model.setSeparating(SCIP_PARAMSETTING.OFF)
-    for name in options.unlimited:
+    for name in (*options.named, *options.unlimited):
         model.setParam(f"separating/{name}/freq", 0)
+    for name in options.unlimited:
         model.setParam(f"separating/{name}/maxroundsroot", -1)
         model.setParam(f"separating/{name}/maxsepacutsroot", 2**30)
         _unlimit_rounds(model)
@@ -251,6 +285,12 @@ def _collect(model: Model, variables: list[Variable], record: RootRecord, unit: 
         int(model.getNTotalNodes()),
         record.rounds,
     )
+
+
+def scip_separators() -> list[str]:
+    """Return the names of SCIP's own separators."""
+    names = (re.fullmatch(r"separating/(\w+)/freq", parameter) for parameter in Model().getParams())
+    return sorted(match[1] for match in names if match)
 
 
 def scip_version() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 from pyscipopt import Model, Variable
 from pyscipopt.scip import Expr, ExprCons, Term
 
-from bcut.bounds.safe import UNBOUNDED
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import IntegerCut
@@ -42,14 +42,15 @@ def build_model(
     Model
         Minimises or maximises, as the objective says.
     list of Variable
-        One binary variable per d-simplex, named ``x_v0_v1_..._vd``.
+        One binary variable per column, named ``x_v0_v1_...``: d-simplices, then other faces.
     """
     model = Model(name)
     model.hideOutput()
     entries = objective.costs if costs is None else costs
+    vertices = [*formulation.simplices.tolist(), *formulation.faces]
     variables = [
-        model.addVar(name="x_" + "_".join(map(str, simplex)), vtype="B", obj=cost)
-        for simplex, cost in zip(formulation.simplices.tolist(), entries.tolist(), strict=True)
+        model.addVar(name="x_" + "_".join(map(str, face)), vtype="B", obj=cost)
+        for face, cost in zip(vertices, [*entries.tolist(), *[0.0] * len(formulation.faces)], strict=True)
     ]
     if objective.sense == "max":
         model.setMaximize()
@@ -57,14 +58,13 @@ def build_model(
         model.setMinimize()
     terms = [Term(variable) for variable in variables]
     matrix = formulation.matrix.tocsr()
-    values = matrix.data.astype(float)
-    for row, face in enumerate(formulation.row_faces):
+    values, lower, upper = formulation.scaled
+    for row in range(matrix.shape[0]):
         part = slice(matrix.indptr[row], matrix.indptr[row + 1])
         expression = _expression(terms, matrix.indices[part], values[part])
-        low, high = int(formulation.lower[row]), int(formulation.upper[row])
-        sides = (None if low == -UNBOUNDED else float(low), None if high == UNBOUNDED else float(high))
-        row_name = "coverage" if face is None else "cocircuit_" + "_".join(map(str, face))
-        model.addCons(ExprCons(expression, *sides), name=row_name)
+        low, high = float(lower[row]), float(upper[row])
+        sides = (None if low == -inf else low, None if high == inf else high)
+        model.addCons(ExprCons(expression, *sides), name=formulation.row_name(row))
     for number, cut in enumerate(cuts):
         expression = _expression(terms, cut.columns, cut.coefficients.astype(float))
         model.addCons(

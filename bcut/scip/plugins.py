@@ -13,6 +13,7 @@ from pyscipopt import SCIP_EVENTTYPE, SCIP_LPSOLSTAT, SCIP_RESULT, SCIP_STAGE, E
 
 from bcut.bounds.root import Round
 from bcut.objectives.objective import Objective
+from bcut.scip.root_lp import RootLpWatcher, read_root_lp
 from bcut.separation.driver import IntegerCut, Separation
 
 # The first relaxation of a node, and the last one after separation. GAPUPDATED is a mask over other types of
@@ -49,16 +50,29 @@ class LpValues:
 
 
 class RootRecord:
-    """The relaxations of the root, one after the other, unrounded."""
+    """The relaxations of the root, one after the other, unrounded.
 
-    def __init__(self, objective: Objective) -> None:
+    Parameters
+    ----------
+    objective : Objective
+    watch : callable, optional
+        Is shown every relaxation of the root as it was solved.
+    families : set of str
+        Names of our families.
+    """
+
+    def __init__(
+        self, objective: Objective, watch: RootLpWatcher | None = None, families: set[str] | None = None
+    ) -> None:
+        self.watch, self.families = watch, families or set()
+        self.watching = 0.0
         self.costs = objective.costs
         self.tolerance = 1e-9 * objective.largest_cost
         self.rounds: list[Round] = []
         self._started = time.perf_counter()
 
     def add(self, x: NDArray[np.float64], cuts: dict[str, int]) -> None:
-        """Record a relaxation point and the cuts then added, by family.
+        """Record the values of the d-simplices in a relaxation, and the cuts then added, by family.
 
         SCIP shows the same relaxation more than once; where nothing happened in between, it stays one round.
         """
@@ -72,6 +86,16 @@ class RootRecord:
             seconds += self.rounds.pop().seconds
         self.rounds.append(Round(value, cuts, seconds))
         self._started = time.perf_counter()
+
+    def show(self, model: Any, values: LpValues, x: NDArray[np.float64]) -> None:
+        """Show a relaxation of the root to whoever watches, before anything is added to it."""
+        if self.watch is not None:
+            started = time.perf_counter()
+            self.watch(read_root_lp(model, values.transformed, x, float(self.costs @ x), self.families))
+            # The time that watching takes is no round's.
+            spent = time.perf_counter() - started
+            self.watching += spent
+            self._started += spent
 
 
 class SeparatorAdapter(Sepa):
@@ -125,6 +149,8 @@ class SeparatorAdapter(Sepa):
         if not _lp_is_optimal(model):
             return SCIP_RESULT.DIDNOTRUN
         x = self.values.read(model)
+        if _at_root(model):
+            self.record.show(model, self.values, x)
         counts: dict[str, int] = {}
         result = self._separate(x, counts) if self._within_rounds() else SCIP_RESULT.DIDNOTRUN
         if _at_root(model):
@@ -134,6 +160,7 @@ class SeparatorAdapter(Sepa):
     def _separate(self, x: NDArray[np.float64], counts: dict[str, int]) -> Any:
         """Add the cuts for a point; counts them by family."""
         assert self.separation is not None
+        self.separation.relaxed(float(self.record.costs @ x), node=self._node)
         for cut in self.separation.round(x):
             infeasible = self._add(cut)
             self.separation.confirm(cut)
@@ -175,8 +202,10 @@ class Observer(Eventhdlr):
         record: RootRecord,
         on_progress: Callable[[dict[str, Any]], None] | None,
         unit: float,
+        separation: Separation | None = None,
     ) -> None:
         self.values, self.record, self.on_progress, self.unit = values, record, on_progress, unit
+        self.separation = separation
         self.error: BaseException | None = None
 
     def eventinit(self) -> None:
@@ -196,11 +225,23 @@ class Observer(Eventhdlr):
         try:
             if event.getType() not in _LP_EVENTS:
                 self._report()
-            elif _at_root(self.model) and _lp_is_optimal(self.model):
-                self.record.add(self.values.read(self.model), {})
+            elif _lp_is_optimal(self.model):
+                self._relaxed()
         except BaseException as error:
             self.error = error
             self.model.interruptSolve()
+
+    def _relaxed(self) -> None:
+        model = self.model
+        if _at_root(model):
+            x = self.values.read(model)
+            self.record.show(model, self.values, x)
+            self.record.add(x, {})
+            value = float(self.record.costs @ x)
+        else:
+            value = model.getLPObjVal() * self.unit
+        if self.separation is not None:
+            self.separation.relaxed(value, node=model.getCurrentNode().getNumber())
 
     def _report(self) -> None:
         if self.on_progress is None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.separation.observer import CutObserver
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 
 # SCIP's own threshold at the root: violation divided by the Euclidean norm of the coefficients.
@@ -153,6 +154,8 @@ class Separation:
     limits : Limits, optional
     statistics : dict of str to FamilyStatistics, optional
         Counts to go on from, changed in place.
+    observer : CutObserver, optional
+        Is told of every round.
 
     Attributes
     ----------
@@ -167,7 +170,9 @@ class Separation:
         limits: Limits | None = None,
         *,
         statistics: dict[str, FamilyStatistics] | None = None,
+        observer: CutObserver | None = None,
     ) -> None:
+        self.observer = observer
         self.separators = list(separators)
         self.problem = problem
         self.limits = limits or Limits()
@@ -183,7 +188,14 @@ class Separation:
     def restricted_to(self, columns: NDArray[np.integer]) -> Separation:
         """Put the same separators to work on some of the columns; the statistics go on."""
         problem = Problem(self.problem.formulation.restricted_to(columns))
-        return Separation(self.separators, problem, self.limits, statistics=self.statistics)
+        return Separation(
+            self.separators, problem, self.limits, statistics=self.statistics, observer=self.observer
+        )
+
+    def relaxed(self, value: float, *, node: int = 0) -> None:
+        """Tell the observer of a relaxation, before its point is separated."""
+        if self.observer is not None:
+            self.observer.relaxed(value, node)
 
     def round(self, x: NDArray[np.floating]) -> list[IntegerCut]:
         """Ask every separator about a point and return the cuts worth adding.
@@ -220,12 +232,17 @@ class Separation:
                     if scaled.efficacy(x) > self.limits.min_efficacy:
                         statistics.found += 1
                         candidates.append(scaled)
-        return self._select(candidates, x)
+        chosen = self._select(candidates, x)
+        if self.observer is not None:
+            self.observer.separated(self.problem, x, candidates, chosen)
+        return chosen
 
     def confirm(self, cut: IntegerCut) -> None:
         """Record that the solver took a cut: it counts as added and is not offered again."""
         self.statistics[cut.family].added += 1
         self.known.add(cut.key)
+        if self.observer is not None:
+            self.observer.took(cut)
 
     def forget(self, cut: IntegerCut) -> None:
         """Allow a cut to be offered again, after the solver dropped it."""

@@ -25,6 +25,7 @@ from bcut.formulations.formulation import Formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.crossings import CrossingTable, crossing_matrix
+from bcut.geometry.overlaps import overlap_matrix
 
 # Values closer than this to 0 or 1 count as integral: SCIP's feasibility tolerance.
 TOLERANCE = 1e-6
@@ -87,6 +88,11 @@ class Problem:
         return self.formulation.simplices
 
     @property
+    def dissection(self) -> bool:
+        """Whether dissections are wanted, so that simplices which merely touch do not cross."""
+        return self.formulation.dissection and not self.chirotope.is_general
+
+    @property
     def dimension(self) -> int:
         """The dimension d of the configuration."""
         return self.chirotope.dimension
@@ -94,10 +100,17 @@ class Problem:
     def crossings(
         self, columns: NDArray[np.integer], others: NDArray[np.integer] | None = None
     ) -> NDArray[np.bool_]:
-        """Tell which simplices cross, shape (len(columns), len(others)); `others` defaults to `columns`."""
+        """Tell which simplices cross, shape (len(columns), len(others)); `others` defaults to `columns`.
+
+        Of two that do, a solution has one at most. Where dissections are wanted, they are those that overlap.
+        """
         if len(self.simplices) <= _SMALL:
             return self._all_crossings[np.ix_(columns, columns if others is None else others)]
         rest = None if others is None else self.simplices[others]
+        if self.dissection:
+            return overlap_matrix(
+                self.chirotope, self.simplices[columns], self.simplices[columns] if rest is None else rest
+            )
         return crossing_matrix(self.chirotope, self.simplices[columns], rest)
 
     def crossing_rows(self, columns: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -110,7 +123,12 @@ class Problem:
         asked = np.asarray(columns).tolist()
         missing = [column for column in dict.fromkeys(asked) if column not in self._rows]
         if missing:
-            computed = np.packbits(self._crossing_table.rows(self.simplices[missing]), axis=1)
+            fresh = self.simplices[missing]
+            if self.dissection:
+                table = overlap_matrix(self.chirotope, fresh, self.simplices)
+            else:
+                table = self._crossing_table.rows(fresh)
+            computed = np.packbits(table, axis=1)
             self._rows.update(zip(missing, computed, strict=True))
         for column in asked:
             self._rows.move_to_end(column)
@@ -140,7 +158,8 @@ class Problem:
 
     @cached_property
     def _all_crossings(self) -> NDArray[np.bool_]:
-        return crossing_matrix(self.chirotope, self.simplices)
+        relation = overlap_matrix if self.dissection else crossing_matrix
+        return relation(self.chirotope, self.simplices)
 
     @cached_property
     def _crossing_table(self) -> CrossingTable:
@@ -224,6 +243,8 @@ class Separator(ABC):
     """
 
     name: ClassVar[str] = ""
+    #: Whether the cuts are valid for all dissections too, not only for triangulations.
+    dissections: ClassVar[bool] = False
     problem: Problem
 
     def setup(self, problem: Problem) -> None:

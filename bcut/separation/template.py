@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from bcut.errors import InputError
+from bcut.files.atomic import write_new
 from bcut.separation.resolve import built_in_names
 
 _TEMPLATE = '''\
@@ -80,13 +81,7 @@ def write_template(name: str, directory: Path) -> Path:
     """
     text = template(name)
     path = directory / _file_name(name)
-    try:
-        with path.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise InputError(f"{path}: exists already; take another name, or move the file away") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+    write_new(path, text)
     return path
 
 

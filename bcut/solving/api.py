@@ -4,35 +4,47 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import comb, inf
 from pathlib import Path
 from typing import Any
 
 from bcut.errors import InputError, SeparatorLoadError
-from bcut.formulations.cocircuits import cocircuit_formulation
-from bcut.formulations.formulation import Formulation
 from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.permutations import PermutationGroup
+from bcut.geometry.restrictions import Restrictions
 from bcut.geometry.symmetry import symmetry_group
 from bcut.instance import load_instance
+from bcut.objectives.invariance import symmetries_of_table
 from bcut.objectives.measures import read_costs
-from bcut.objectives.objective import make_objective
+from bcut.objectives.objective import objective_of
+from bcut.objectives.syntax import ObjectiveName, read_level, read_objective
 from bcut.result import Certificate, Question, Result
 from bcut.separation.driver import check_names
+from bcut.separation.observer import CutObserver
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Separator
-from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits
-from bcut.solving.certificates import make_certificate
+from bcut.solving.bottleneck import solve_bottleneck
+from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
+from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
+from bcut.solving.embedding import costs_to_embed
+from bcut.solving.groups import GroupLike, subgroups_to_try, symmetries_of
+from bcut.solving.levels import Levels, solve_listed
 from bcut.solving.orbit_stage import OrbitStage, orbit_stage
+from bcut.solving.programs import formulation_name, make_formulation
 from bcut.solving.report import make_result
 from bcut.solving.search import Part, Progress, Search, bound_at_root, place
-from bcut.solving.strategies import solve_at_once, solve_by_targets, solve_in_scip
+from bcut.solving.strategies import solve_in_scip
 
 DEFAULT_SEPARATORS = ("link",)
-FORMULATIONS: dict[str, Callable[..., Formulation]] = {"2": cocircuit_formulation}
+# Relaxations of stable sets are so weak that cliques close most of their gaps; link cuts are not valid for dissections.
+SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
+SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
 METHODS = ("auto", "listing", "orbits", "scip")
-# From so many (d+1)-subsets on, the symmetries of a configuration are used where it has any.
-_ORBITS_FROM = 200_000
+# From so many (d+1)-subsets on, the symmetries of a configuration are used where it has at least so many; with more
+# subsets than can be listed, where it has any.
+_ORBITS_FROM, _SYMMETRIES = 10_000, 8
+_LISTED = 20_000_000
 
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
@@ -42,14 +54,22 @@ def solve(
     instance: InstanceLike,
     *,
     objective: str = "cardinality",
-    sense: str = "min",
-    formulation: str = "2",
+    sense: str | None = None,
+    then: Sequence[str] = (),
+    formulation: str | None = None,
     spanning: bool = False,
+    dissection: bool = False,
+    require: Sequence[Sequence[int]] = (),
+    forbid: Sequence[Sequence[int]] = (),
+    star: int | None = None,
     separators: Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
     seed: int = 0,
     method: str = "auto",
+    symmetries: GroupLike | None = None,
+    invariant_under: int | GroupLike | None = None,
     on_progress: Progress | None = None,
+    cut_observer: CutObserver | None = None,
 ) -> Result:
     """Find an optimal triangulation.
 
@@ -58,11 +78,26 @@ def solve(
     instance : str, path or PointConfiguration
         A file, a bundled instance or a family (``"cube:4"``).
     objective : str
-        ``"cardinality"``, ``"costs:FILE"``, ``"random-costs:SEED"``.
-    sense : {"min", "max"}
-    formulation : {"2"}
+        A measure, whose sum counts: ``"cardinality"``, ``"weight"``, ``"volume"``, ``"aspect-ratio"``, ``"min-angle"``
+        (2D), ``"dihedral-angle"``, ``"solid-angle"`` (3D), ``"costs:FILE"``, ``"random-costs:SEED"``, or a function in
+        a file, ``"./mine.py"`` or ``"./mine.py:function"``. ``"min-max:MEASURE"`` and ``"max-min:MEASURE"`` are
+        bottlenecks: the worst simplex counts.
+    sense : {"min", "max"}, optional
+        Of a sum, which is minimised without it. Bottlenecks have their own.
+    then : sequence of str
+        Further objectives, each of which decides among the best by those before it: ``["cardinality"]``,
+        ``["max:weight"]``.
+    formulation : {"2", "0", "1", "chambers"}, optional
+        The integer program; "2", the cocircuit form, if left out, and "chambers" for dissections.
     spanning : bool
         Only triangulations that use every point.
+    dissection : bool
+        Whether simplices need not meet face to face, as long as they do not overlap. In general position they always
+        do.
+    require, forbid : sequence of sequences of int
+        Faces of any dimension, as sets of points, that must be in the triangulation, or must not.
+    star : int, optional
+        Only triangulations all of whose simplices have this point as a vertex.
     separators : sequence of str, Separator or Separator subclass, optional
         The cut families at work; a default set when omitted, none when empty.
     time_limit : float, optional
@@ -73,8 +108,17 @@ def solve(
         "listing" lists all simplices, bounds and fixes at the root, and lets SCIP branch on what is left; "orbits"
         does so with orbits of simplices under the symmetries, for cardinality only; "scip" hands SCIP everything.
         "auto" takes orbits for large symmetric configurations, and lists otherwise.
+    symmetries : path, or sequence of permutations, optional
+        For the method "orbits", which "auto" then is: generators of the symmetries to work with, instead of all that
+        there are. A file holds ``[[1,0,2,3],[0,1,3,2]]``, or is one of TOPCOM's with generators behind its points.
+    invariant_under : int, path, or sequence of permutations, optional
+        For the method "orbits", which "auto" then is: only triangulations that some symmetries leave invariant, given
+        as `symmetries`; or those that are invariant under some subgroup of this order, among those that a random
+        search finds, one of each kind. Value, bound and status are about these triangulations.
     on_progress : callable, optional
         Told of stages, bounds and incumbents, as a dict.
+    cut_observer : CutObserver, optional
+        Told of every relaxation that is separated, and of every cut that is found.
 
     Returns
     -------
@@ -93,14 +137,29 @@ def solve(
     5
     """
     run = _Run(
-        instance, objective, sense, formulation, spanning, separators, time_limit, seed, method, on_progress
+        instance,
+        objective,
+        sense,
+        formulation,
+        spanning,
+        separators,
+        time_limit,
+        seed,
+        method,
+        on_progress,
+        then=then,
+        symmetries=symmetries,
+        invariant_under=invariant_under,
+        dissection=dissection,
+        restrictions={"require": require, "forbid": forbid, "star": star},
     )
     search = run.search
+    search.cut_observer = cut_observer
     try:
         run.solve()
     except KeyboardInterrupt:
         search.status = "interrupted"
-    if search.columns is None and search.status != "infeasible":
+    if search.columns is None and search.status != "infeasible" and run.subgroups is None:
         place(search)
     return run.finish()
 
@@ -109,13 +168,18 @@ def bound(
     instance: InstanceLike,
     *,
     objective: str = "cardinality",
-    sense: str = "min",
-    formulation: str = "2",
+    sense: str | None = None,
+    formulation: str | None = None,
     spanning: bool = False,
+    dissection: bool = False,
+    require: Sequence[Sequence[int]] = (),
+    forbid: Sequence[Sequence[int]] = (),
+    star: int | None = None,
     separators: Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
     seed: int = 0,
     method: str = "auto",
+    symmetries: GroupLike | None = None,
     on_progress: Progress | None = None,
 ) -> Result:
     """Bound the optimum at the root, before and after cuts, with no branching and none of the solver's own cuts.
@@ -126,7 +190,19 @@ def bound(
     if method == "scip":
         raise InputError("method 'scip': it is for solve only; known here are auto, listing and orbits")
     run = _Run(
-        instance, objective, sense, formulation, spanning, separators, time_limit, seed, method, on_progress
+        instance,
+        objective,
+        sense,
+        formulation,
+        spanning,
+        separators,
+        time_limit,
+        seed,
+        method,
+        on_progress,
+        symmetries=symmetries,
+        dissection=dissection,
+        restrictions={"require": require, "forbid": forbid, "star": star},
     )
     run.search.status = "bound"
     try:
@@ -144,29 +220,61 @@ class _Run:
         self,
         instance: InstanceLike,
         objective: str,
-        sense: str,
-        formulation: str,
+        sense: str | None,
+        formulation: str | None,
         spanning: bool,
         separators: Sequence[SeparatorLike] | None,
         time_limit: float | None,
         seed: int,
         method: str,
         on_progress: Progress | None,
+        *,
+        then: Sequence[str] = (),
+        symmetries: GroupLike | None = None,
+        invariant_under: int | GroupLike | None = None,
+        dissection: bool = False,
+        restrictions: dict[str, Any] | None = None,
     ) -> None:
         self.started = time.perf_counter()
-        _check_options(formulation, time_limit, seed, method)
-        given = DEFAULT_SEPARATORS if separators is None else tuple(separators)
-        check_names([_make(item) for item in given])
+        formulation = formulation_name(formulation, dissection=dissection)
+        _check_options(time_limit, seed, method)
+        self.name = read_objective(objective, sense)
+        sense = self.name.sense
+        following = [read_level(text) for text in then]
+        given = _default_separators(formulation, dissection) if separators is None else tuple(separators)
+        families_given = [_make(item) for item in given]
+        check_names(families_given)
         deadline = None if time_limit is None else time.monotonic() + time_limit
         self.configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
         started = time.perf_counter()
-        self.method = method
+        self.restrictions = Restrictions.of(self.configuration, **(restrictions or {}))
+        self.whole_question = formulation == "2" and not self.restrictions
+        grouped = symmetries is not None or invariant_under is not None
+        if grouped and method not in ("auto", "orbits"):
+            raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
+        self.method = "orbits" if grouped else method
+        _check_method(self.name, following, self.method)
+        if following and self.method == "auto":
+            self.method = "listing"
+        self.subgroups: list[PermutationGroup] | None = None
         families = {_describe(item).split(":")[0] for item in given}
         self.link, self.only_link = "link" in families, families <= {"link"}
-        self.stage = self._orbits(objective, sense, spanning, time_limit)
+        self.stage = self._orbits(objective, sense, spanning, time_limit, symmetries)
+        if self.stage is not None and invariant_under is not None:
+            self.subgroups = subgroups_to_try(
+                self.configuration, self.stage.group, invariant_under, seed=seed
+            )
         if self.stage is None:
-            listed = FORMULATIONS[formulation](self.configuration, spanning=spanning)
-            whole = Part.whole(listed, make_objective(objective, listed, sense=sense))
+            listed = make_formulation(
+                formulation,
+                self.configuration,
+                spanning=spanning,
+                dissection=dissection,
+                restrictions=self.restrictions,
+            )
+            if listed.dissection and not listed.chirotope.is_general:
+                _check_valid_for_dissections(families_given)
+            whole = Part.whole(listed, objective_of(self.name, listed))
             self.size = listed.size
         else:
             whole = known_triangulation(self.stage)
@@ -177,7 +285,9 @@ class _Run:
             deadline=deadline,
             seed=seed,
             on_progress=on_progress,
+            restricted=bool(self.restrictions),
         )
+        self.levels = Levels(self.search, following) if following else None
         self.search.seconds["model"] = time.perf_counter() - started
         self.question = Question(
             objective=objective,
@@ -188,36 +298,64 @@ class _Run:
             seed=seed,
             limits={"time": time_limit},
             method=self.method,
-            costs=_embedded_costs(objective, self.configuration),
+            invariant_under=None
+            if self.subgroups is None
+            else [subgroup.generators.tolist() for subgroup in self.subgroups],
+            dissection=dissection,
+            require=[list(face) for face in self.restrictions.require],
+            forbid=[list(face) for face in self.restrictions.forbid],
+            star=self.restrictions.star,
         )
 
-    def _orbits(self, objective: str, sense: str, spanning: bool, seconds: float | None) -> OrbitStage | None:
+    def _orbits(
+        self,
+        objective: str,
+        sense: str,
+        spanning: bool,
+        seconds: float | None,
+        symmetries: GroupLike | None,
+    ) -> OrbitStage | None:
         """Return the stage over orbits where that is the way to go, and settle what "auto" means."""
         n, d = self.configuration.n, self.configuration.dimension
         invariant = objective == "cardinality"
-        if self.method == "orbits" and not invariant:
+        if self.method == "orbits" and not self.whole_question:
             raise InputError(
-                f"method 'orbits': objective '{objective}' is not known to be invariant; use cardinality"
+                "method 'orbits': it works with formulation 2, and without required or forbidden faces and stars; use "
+                "the method listing"
+            )
+        if self.method == "orbits" and not (invariant or objective.startswith("costs:")):
+            raise InputError(
+                f"method 'orbits': objective '{objective}' is not known to be invariant; use cardinality or costs:FILE"
             )
         if self.method == "auto":
             # Other families than link are at work in the tree only, over orbits: who asks for them wants the listing.
-            large = invariant and self.only_link and comb(n, d + 1) >= _ORBITS_FROM
-            symmetric = large and symmetry_group(self.configuration).order > 1
+            large = invariant and self.only_link and self.whole_question and comb(n, d + 1) >= _ORBITS_FROM
+            fewest = _SYMMETRIES if comb(n, d + 1) <= _LISTED else 2
+            symmetric = large and symmetry_group(self.configuration).order >= fewest
             self.method = "orbits" if symmetric else "listing"
         if self.method != "orbits":
             return None
-        return orbit_stage(self.configuration, objective, sense=sense, spanning=spanning, seconds=seconds)
+        group = symmetries_of(self.configuration, symmetries)
+        if not invariant:
+            default, table = read_costs(Path(objective.partition(":")[2]), self.configuration)
+            group = symmetries_of_table(group, default, table)
+        return orbit_stage(
+            self.configuration, objective, sense=sense, spanning=spanning, group=group, seconds=seconds
+        )
 
     def solve(self) -> None:
         """Search for an optimum."""
         if self.stage is not None:
-            solve_by_orbits(self.search, self.stage, cuts=self.link)
+            if self.subgroups is None:
+                solve_by_orbits(self.search, self.stage, cuts=self.link)
+            else:
+                solve_invariant(self.search, self.stage, self.subgroups, cuts=self.link)
         elif self.method == "scip":
             solve_in_scip(self.search)
-        elif self.search.whole.objective.counts_units:
-            solve_by_targets(self.search)
+        elif self.levels is not None:
+            self.levels.solve()
         else:
-            solve_at_once(self.search)
+            solve_listed(self.search)
 
     def bound(self) -> None:
         """Bound at the root only."""
@@ -226,7 +364,12 @@ class _Run:
             bound_by_orbits(search, self.stage, cuts=self.link)
             search.status = "limit" if search.bound is None else "bound"
             return
+        if self.name.is_bottleneck:
+            solve_bottleneck(search, branching=False)
+            return
         root = bound_at_root(search, search.whole, search.separation(search.whole))
+        if root.status == "infeasible":
+            search.status = "infeasible"
         search.exact = root.first
         if root.last is not None:
             search.raise_bound(root.last.value)
@@ -235,34 +378,76 @@ class _Run:
 
     def finish(self) -> Result:
         """Verify what was found and write it down."""
-        return make_result(
+        certificate = self.certificate()
+        if self.levels is not None:
+            self.levels.conclude()
+        self.question.costs = costs_to_embed(
+            self.name, self.search.whole.objective, self.configuration, self.search
+        )
+        if self.levels is not None:
+            self.question.then = self.levels.questions(self.configuration)
+        result = make_result(
             self.configuration,
             self.question,
             self.search,
             size=self.size,
-            certificate=self.certificate(),
+            certificate=certificate,
             started=self.started,
         )
+        if self.levels is not None:
+            result.then = self.levels.records()
+        return result
 
     def certificate(self) -> Certificate:
         """Write out the multipliers of the exact bound without cuts."""
         exact = self.search.exact
         if self.search.certificate is not None:
             return self.search.certificate
+        if self.search.status == "infeasible" and not self.question.dissection:
+            return self._proof_of_infeasibility()
         if exact is None:
             return Certificate(reason="no relaxation was solved to optimality outside SCIP")
-        return make_certificate(self.search.whole.formulation, self.search.whole.objective, exact)
+        whole, refutation = self.search.whole, self.search.refutation
+        return make_certificate(whole.formulation, whole.objective, exact, refutation)
+
+    def _proof_of_infeasibility(self) -> Certificate:
+        program = self.search.whole.formulation
+        if program.name != "2":
+            program = make_formulation(
+                "2", self.configuration, spanning=program.spanning, restrictions=self.restrictions
+            )
+        return make_infeasibility_certificate(program)
 
 
-def _check_options(formulation: str, time_limit: float | None, seed: int, method: str) -> None:
-    if formulation not in FORMULATIONS:
-        raise InputError(f"unknown formulation '{formulation}': known are {', '.join(FORMULATIONS)}")
+def _check_options(time_limit: float | None, seed: int, method: str) -> None:
     if method not in METHODS:
         raise InputError(f"unknown method '{method}': known are {', '.join(METHODS)}")
     if time_limit is not None and not 0 <= time_limit < inf:
         raise InputError(f"time limit {time_limit}: give a finite number of seconds that is not negative")
     if seed < 0:
         raise InputError(f"seed {seed}: give an integer that is not negative")
+
+
+def _check_method(name: ObjectiveName, following: Sequence[ObjectiveName], method: str) -> None:
+    """Refuse methods that know sums of one objective only."""
+    if method in ("orbits", "scip") and (name.is_bottleneck or following):
+        what = f"a bottleneck such as '{name.text}'" if name.is_bottleneck else "one objective after another"
+        raise InputError(f"method '{method}' does not work with {what}; use the method listing")
+
+
+def _default_separators(formulation: str, dissection: bool) -> tuple[str, ...]:
+    if dissection:
+        return SEPARATORS_FOR_DISSECTIONS
+    return SEPARATORS_FOR_STABLE_SETS if formulation in ("0", "1") else DEFAULT_SEPARATORS
+
+
+def _check_valid_for_dissections(separators: Sequence[Separator]) -> None:
+    for separator in separators:
+        if not separator.dissections:
+            raise InputError(
+                f"separator '{separator.name}' makes cuts that triangulations satisfy, but dissections need not; leave "
+                "it out (families for dissections set 'dissections = True')"
+            )
 
 
 def _make(item: SeparatorLike) -> Separator:
@@ -276,13 +461,3 @@ def _make(item: SeparatorLike) -> Separator:
 
 def _describe(item: SeparatorLike) -> str:
     return item if isinstance(item, str) else item.name
-
-
-def _embedded_costs(objective: str, configuration: PointConfiguration) -> dict[str, Any] | None:
-    """Return the table of a costs file, so that the result alone is enough to verify the value."""
-    kind, _, path = objective.partition(":")
-    if kind != "costs":
-        return None
-    default, table = read_costs(Path(path), configuration)
-    entries = [[list(simplex), str(cost)] for simplex, cost in sorted(table.items())]
-    return {"default": str(default), "costs": entries}

@@ -5,28 +5,36 @@ No step lists all simplices, so configurations such as the 6-cube, with 366 mill
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from fractions import Fraction
-from math import comb
+from math import comb, inf
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bcut.errors import TooLargeError
 from bcut.formulations.partial_cocircuits import partial_cocircuit_formulation
 from bcut.geometry.partial_chirotope import PartialChirotope
+from bcut.geometry.permutations import PermutationGroup
 from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import make_objective
+from bcut.separation.driver import FamilyStatistics
 from bcut.solving.certificates import make_orbit_certificate
-from bcut.solving.invariant_search import find_invariant_triangulation
+from bcut.solving.invariant_search import PASSES, find_invariant_triangulation
 from bcut.solving.orbit_stage import OrbitStage
 from bcut.solving.search import Part, Search, branch
 from bcut.solving.strategies import is_optimal
 
 # SCIP looks at a program with at most so many columns for some seconds before subgroups are tried.
 _SMALL = 15_000
-_SECONDS_FOR_SMALL = 20.0
+_SECONDS_FOR_SMALL = 3.0
 # Averaged link cuts look at every orbit of (d-2)-faces; with more faces than this they take longer than they are worth.
 _MOST_FACES = 300_000
+# Where the bound is not reached: columns among which better triangulations are sought, and for how long.
+_MOST_TO_IMPROVE = 60_000
+_SECONDS_TO_IMPROVE = 60.0
 
 
 def known_triangulation(stage: OrbitStage) -> Part:
@@ -74,11 +82,24 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
             left = search.seconds_left
             stage = stage.with_link_cuts(seconds=None if left is None else lambda: search.seconds_left or 0.0)
         assert stage.root.bound is not None
+        _record(search, stage)
         search.lp_after_cuts = stage.root.lp
         search.raise_bound(stage.root.bound.value)
         search.certificate = make_orbit_certificate(stage)
         search.report("orbits", lp=stage.root.lp)
     return stage
+
+
+def _record(search: Search, stage: OrbitStage) -> None:
+    """Write down the rounds of averaged cuts."""
+    search.rounds.extend(("orbits", finished) for finished in stage.rounds)
+    family = search.statistics.setdefault("link", FamilyStatistics())
+    family.calls += len(stage.rounds)
+    family.seconds += stage.separating
+    for finished in stage.rounds:
+        added = finished.cuts.get("link", 0)
+        family.found += added
+        family.added += added
 
 
 def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
@@ -92,14 +113,14 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
     cuts : bool
         Whether link cuts are wanted.
     """
-    known = search.whole
-    search.offer(known.columns)
+    best = _Best(search.whole, search.columns)
+    search.offer(search.whole.columns)
+    best.keep(search)
     stage = bound_by_orbits(search, stage, cuts=cuts)
     if search.bound is None:
         return
     objective = stage.objective
     search.raise_bound(objective.rounded_up(search.bound))
-    best = search.value
     while not is_optimal(search):
         target = search.bound
         try:
@@ -109,11 +130,10 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
         search.whole, search.columns = Part.whole(formulation, costs), None
         search.columns_after_fixing = len(formulation.simplices)
         try:
-            outcome = _reach(search, stage, target)
+            outcome = _reach(search, stage, target, best)
         finally:
             # Also after Ctrl-C: what is handed out is a triangulation in any case.
-            if search.value is None or (best is not None and search.sign * search.value > search.sign * best):
-                search.whole, search.columns = known, known.columns
+            best.keep(search)
         if outcome == "refuted":
             search.raise_bound(target + objective.unit)
         elif outcome != "reached":
@@ -122,8 +142,83 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
     search.status = "optimal" if is_optimal(search) else "limit"
 
 
+class _Best:
+    """The best triangulation so far, with the program that it is a solution of: each step has a program of its own."""
+
+    def __init__(self, part: Part, columns: NDArray[np.intp] | None) -> None:
+        self.part, self.columns = part, columns
+
+    @property
+    def value(self) -> Fraction | None:
+        return None if self.columns is None else self.part.objective.value(self.columns)
+
+    def keep(self, search: Search) -> None:
+        """Take over what the search has found, or give it what is better."""
+        if self.value is None or (
+            search.value is not None and search.sign * search.value < search.sign * self.value
+        ):
+            self.part, self.columns = search.whole, search.columns
+        else:
+            search.whole, search.columns = self.part, self.columns
+
+
+def solve_invariant(
+    search: Search, stage: OrbitStage, subgroups: Sequence[PermutationGroup], *, cuts: bool
+) -> None:
+    """Find a best one among the triangulations that are invariant under one of some subgroups.
+
+    Parameters
+    ----------
+    search : Search
+        Ends with the best triangulation, its bound being one on such triangulations.
+    stage : OrbitStage
+    subgroups : sequence of PermutationGroup
+        Of the stage's group.
+    cuts : bool
+        Whether link cuts are wanted.
+    """
+    stage = bound_by_orbits(search, stage, cuts=cuts)
+    if search.bound is None:
+        return
+    objective = stage.objective
+    target = objective.rounded_up(search.bound)
+    while True:
+        search.raise_bound(target)
+        try:
+            formulation, costs = stage.residual(target)
+        except TooLargeError:
+            return
+        search.whole, search.columns = Part.whole(formulation, costs), None
+        search.columns_after_fixing = len(formulation.simplices)
+        everything = len(formulation.simplices) == stage.formulation.sizes.sum()
+        with search.timed("invariant"):
+            found = find_invariant_triangulation(
+                formulation,
+                costs,
+                stage.group,
+                # On all columns there is nothing that a higher target could add.
+                cutoff=None if everything else target + objective.unit / 2,
+                goal=target,
+                deadline=search.deadline,
+                seed=search.seed,
+                subgroups=subgroups,
+                passes=(*PASSES, inf),
+            )
+        if found.columns is not None:
+            search.offer(found.columns)
+        if found.status == "limit" or found.status == "interrupted":
+            search.status = found.status
+            return
+        if everything or found.columns is not None:
+            search.status = "infeasible" if search.value is None else "optimal"
+            if search.value is not None:
+                search.raise_bound(search.sign * search.value)
+            return
+        target += objective.unit
+
+
 def _reach(
-    search: Search, stage: OrbitStage, target: Fraction
+    search: Search, stage: OrbitStage, target: Fraction, best: _Best
 ) -> Literal["reached", "refuted", "limit", "interrupted"]:
     """Look for a triangulation of the target value, times sign, on the columns that may be in one."""
     part = search.whole
@@ -132,24 +227,54 @@ def _reach(
     if len(part.columns) <= _SMALL:
         decided = branch(search, part, None, cutoff=float(search.sign * cutoff), seconds=_SECONDS_FOR_SMALL)
     if decided in ("", "limit") and not is_optimal(search):
-        with search.timed("invariant"):
-            found = find_invariant_triangulation(
-                part.formulation,
-                part.objective,
-                stage.group,
-                cutoff=cutoff,
-                goal=target,
-                deadline=search.deadline,
-                seed=search.seed,
-            )
-        if found is not None:
-            search.offer(np.asarray(found.columns))
+        _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=inf)
     if is_optimal(search):
         return "reached"
     if decided not in ("infeasible", "interrupted"):
+        _improve(search, stage, target, best)
+        search.whole = part
+        if is_optimal(search):
+            return "reached"
         decided = branch(search, part, None, cutoff=float(search.sign * cutoff))
     if is_optimal(search):
         return "reached"
     if decided == "infeasible":
         return "refuted"
     return "interrupted" if decided == "interrupted" else "limit"
+
+
+def _improve(search: Search, stage: OrbitStage, target: Fraction, best: _Best) -> None:
+    """Look for better triangulations than the best one, with more columns than the target leaves.
+
+    The full search for the target may take forever; what a limit then hands out should be good.
+    """
+    best.keep(search)
+    assert best.value is not None
+    widest = stage.target_for(_MOST_TO_IMPROVE)
+    reachable = min(search.sign * best.value - stage.objective.unit, widest)
+    if reachable > target:
+        formulation, costs = stage.residual(reachable)
+        search.whole, search.columns = Part.whole(formulation, costs), None
+        cutoff = search.sign * best.value
+        _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=_SECONDS_TO_IMPROVE)
+        best.keep(search)
+
+
+def _search_invariant(
+    search: Search, stage: OrbitStage, *, cutoff: Fraction, goal: Fraction, seconds: float
+) -> None:
+    """Offer the best triangulation of the search's program that some subgroup leaves invariant."""
+    part = search.whole
+    deadline = min(inf if search.deadline is None else search.deadline, time.monotonic() + seconds)
+    with search.timed("invariant"):
+        found = find_invariant_triangulation(
+            part.formulation,
+            part.objective,
+            stage.group,
+            cutoff=cutoff,
+            goal=goal,
+            deadline=None if deadline == inf else deadline,
+            seed=search.seed,
+        )
+    if found.columns is not None:
+        search.offer(found.columns)

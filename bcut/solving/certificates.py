@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
+from bcut.bounds.infeasibility import infeasibility_bound
+from bcut.bounds.root import Stage
 from bcut.bounds.safe import SafeBound
+from bcut.formulations.chambers import CHAMBER_ROW
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.result import Certificate
 from bcut.solving.orbit_stage import OrbitStage
 
 
-def make_certificate(formulation: Formulation, objective: Objective, bound: SafeBound) -> Certificate:
-    """Write out the multipliers of a bound that needs no cuts.
+def make_certificate(
+    formulation: Formulation,
+    objective: Objective,
+    bound: SafeBound,
+    refutation: tuple[Fraction, Sequence[Stage]] | None = None,
+) -> Certificate:
+    """Write out the multipliers of a bound that needs no cuts, and perhaps the refutation of a target beyond it.
 
     Parameters
     ----------
@@ -21,16 +30,81 @@ def make_certificate(formulation: Formulation, objective: Objective, bound: Safe
     objective : Objective
     bound : SafeBound
         From duals of the rows of `formulation` alone.
+    refutation : (Fraction, sequence of Stage), optional
+        A value of ``sign * objective`` that no triangulation reaches, and why. The first stage has the columns that
+        `bound` leaves.
     """
-    multipliers: list[list[object]] = []
-    for face, multiplier in zip(formulation.row_faces, bound.multipliers.tolist(), strict=True):
-        if multiplier:
-            row = "coverage" if face is None else list(face)
-            multipliers.append([row, str(multiplier * bound.unit)])
+    refutes = None
+    if refutation is not None:
+        target, stages = refutation
+        refutes = {"target": str(objective.sign * target), "stages": [_stage(stage) for stage in stages]}
     return Certificate(
         bound=str(objective.sign * bound.value),
         flag=formulation.chirotope.bases[0].tolist(),
+        multipliers=_multipliers(formulation, bound),
+        refutes=refutes,
+    )
+
+
+def _multipliers(formulation: Formulation, bound: SafeBound) -> list[list[object]]:
+    """Return the multipliers of the rows, without those of cuts."""
+    rows = zip(formulation.row_faces, bound.multipliers[: len(formulation.row_faces)].tolist(), strict=True)
+    return [
+        [_row(formulation, number) if face is None else list(face), str(multiplier * bound.unit)]
+        for number, (face, multiplier) in enumerate(rows)
+        if multiplier
+    ]
+
+
+def _row(formulation: Formulation, number: int) -> object:
+    """Return what stands for a row that is no cocircuit row: its name, or the generic point of a chamber."""
+    name = formulation.row_name(number)
+    if name.startswith(CHAMBER_ROW):
+        return {"flag": [int(vertex) for vertex in name.removeprefix(CHAMBER_ROW).split("_")]}
+    return name
+
+
+def _stage(stage: Stage) -> dict[str, object]:
+    formulation, bound = stage.formulation, stage.bound
+    cuts = zip(stage.cuts, bound.multipliers[len(formulation.row_faces) :].tolist(), strict=True)
+    return {
+        "multipliers": _multipliers(formulation, bound),
+        "cuts": [
+            {
+                "family": cut.family,
+                "simplices": formulation.simplices[cut.columns].tolist(),
+                "coefficients": cut.coefficients.tolist(),
+                "rhs": cut.rhs,
+                "multiplier": str(multiplier * bound.unit),
+                # The weights of all wedges of a link cut are no news: its coefficients and the face are enough.
+                "proof": {key: part for key, part in cut.proof.items() if key not in ("alpha", "wedges")},
+            }
+            for cut, multiplier in cuts
+            if multiplier
+        ],
+    }
+
+
+def make_infeasibility_certificate(formulation: Formulation) -> Certificate:
+    """Prove that there is no triangulation, where the relaxation has no point.
+
+    Parameters
+    ----------
+    formulation : Formulation
+        Formulation 2, with all its columns.
+    """
+    bound = infeasibility_bound(formulation)
+    if bound is None:
+        return Certificate(reason="that there is no triangulation rests on the solver's tree")
+    multipliers: list[list[object]] = [["coverage", "1"]]
+    for face, multiplier in zip(formulation.row_faces[1:], bound.multipliers.tolist(), strict=True):
+        if multiplier:
+            multipliers.append([list(face or ()), str(multiplier * bound.unit)])
+    return Certificate(
+        bound=str(1 + bound.value),
+        flag=formulation.chirotope.bases[0].tolist(),
         multipliers=multipliers,
+        infeasible=True,
     )
 
 
@@ -60,7 +134,8 @@ def make_orbit_certificate(stage: OrbitStage) -> Certificate:
             "coefficients": cut.coefficients.tolist(),
             "rhs": 0,
             "multiplier": str(Fraction(multiplier, bound.denominator) / cut.factor),
-            "proof": cut.proof,
+            # Weights of all wedges are no news: those that differ between directions are the coefficients.
+            "proof": {"face": list(cut.face)},
         }
         for cut, multiplier in zip(stage.cuts, bound.multipliers[rows:].tolist(), strict=True)
         if multiplier

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from bcut.errors import InputError
+from bcut.errors import InputError, TooLargeError
 from bcut.files.atomic import check_writable, replacing
 from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.restrictions import Restrictions
 from bcut.instance import load_instance
-from bcut.objectives.objective import make_objective
-from bcut.solving.api import FORMULATIONS, InstanceLike
+from bcut.objectives.objective import sum_objective
+from bcut.solving.api import InstanceLike
+from bcut.solving.programs import formulation_name, make_formulation
 
 #: Suffixes of model files, each a format.
 MODEL_SUFFIXES = (".lp", ".mps")
@@ -20,9 +23,13 @@ def export(
     path: str | Path,
     *,
     objective: str = "cardinality",
-    sense: str = "min",
-    formulation: str = "2",
+    sense: str | None = None,
+    formulation: str | None = None,
     spanning: bool = False,
+    dissection: bool = False,
+    require: Sequence[Sequence[int]] = (),
+    forbid: Sequence[Sequence[int]] = (),
+    star: int | None = None,
 ) -> None:
     """Write the integer program of an instance as an LP or MPS file.
 
@@ -32,8 +39,8 @@ def export(
     path : str or path
         Ends in ".lp" or ".mps". The variable of a simplex is called ``x_v0_v1_..._vd``, a cocircuit row after
         its (d-1)-simplex.
-    objective, sense, formulation, spanning
-        As for `bcut.solve`.
+    objective, sense, formulation, spanning, dissection, require, forbid, star
+        As for `bcut.solve`. Rows that `solve` adds when they are needed are written down where they are few.
 
     Raises
     ------
@@ -46,11 +53,21 @@ def export(
             f"{target}: unknown suffix '{target.suffix}'; models are written as {', '.join(MODEL_SUFFIXES)}"
         )
     check_writable(target)
-    if formulation not in FORMULATIONS:
-        raise InputError(f"unknown formulation '{formulation}': known are {', '.join(FORMULATIONS)}")
+    name = formulation_name(formulation, dissection=dissection)
     configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
-    program = FORMULATIONS[formulation](configuration, spanning=spanning)
-    costs = make_objective(objective, program, sense=sense)
+    program = make_formulation(
+        name,
+        configuration,
+        spanning=spanning,
+        dissection=dissection,
+        restrictions=Restrictions.of(configuration, require=require, forbid=forbid, star=star),
+    )
+    if program.lazy:
+        raise TooLargeError(
+            f"{configuration.name}: formulation {name} has rows that are only made when a point violates them, because "
+            "they are many, or because volumes are no small integers; a file would lack them. Export formulation 2"
+        )
+    costs = sum_objective(objective, program, sense=sense, purpose="a model file")
     from bcut.scip.model import write_model
 
     with replacing(target) as temporary:

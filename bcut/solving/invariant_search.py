@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from math import inf
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,29 +24,33 @@ from bcut.geometry.subgroups import some_subgroups
 from bcut.objectives.objective import Objective
 
 # Seconds for every subgroup: those that are decided quickly first, the hard ones again later.
-_PASSES = (2.0, 15.0, 90.0)
+PASSES = (2.0, 15.0, 90.0)
 # Orders of subgroups, at most: triangulations with more symmetries are rare.
 _LARGEST = 32
 
 
-@dataclass(frozen=True, eq=False)
-class InvariantTriangulation:
-    """A triangulation, and what leaves it invariant.
+@dataclass
+class InvariantSearch:
+    """What a search found.
 
     Attributes
     ----------
-    columns : ndarray of int
-        Columns of the formulation.
-    value : Fraction
-    subgroup : PermutationGroup
+    status : {"goal", "decided", "limit", "interrupted"}
+        "decided" when no program was left undecided: then nothing better is invariant under one of the subgroups.
+    columns : ndarray of int or None
+        Of the formulation: the best triangulation, not verified.
+    value : Fraction or None
+    subgroup : PermutationGroup or None
+        What leaves it invariant.
     attempts : int
         Programs that were solved.
     """
 
-    columns: NDArray[np.intp]
-    value: Fraction
-    subgroup: PermutationGroup
-    attempts: int
+    status: Literal["goal", "decided", "limit", "interrupted"] = "decided"
+    columns: NDArray[np.intp] | None = None
+    value: Fraction | None = None
+    subgroup: PermutationGroup | None = None
+    attempts: int = 0
 
 
 def find_invariant_triangulation(
@@ -58,8 +63,9 @@ def find_invariant_triangulation(
     deadline: float | None = None,
     seed: int = 0,
     subgroups: Sequence[PermutationGroup] | None = None,
+    passes: Sequence[float] = PASSES,
     on_progress: Callable[[dict[str, Any]], None] | None = None,
-) -> InvariantTriangulation | None:
+) -> InvariantSearch:
     """Look for a triangulation that is invariant under some subgroup.
 
     Parameters
@@ -80,51 +86,53 @@ def find_invariant_triangulation(
         Of the choice of subgroups, and of the solver.
     subgroups : sequence of PermutationGroup, optional
         To be tried in this order; small ones of `group` when left out, from the largest on.
+    passes : sequence of float
+        Seconds for every subgroup in each pass over those that are undecided.
     on_progress : callable, optional
         Told of every attempt.
-
-    Returns
-    -------
-    InvariantTriangulation or None
-        The best that was found; not verified.
     """
     from bcut.scip.host import TreeOptions, branch_and_cut
 
     sign = objective.sign
     rest = list(some_subgroups(group, largest=_LARGEST, seed=seed) if subgroups is None else subgroups)
-    best: InvariantTriangulation | None = None
-    attempts = 0
-    for seconds in _PASSES:
+    search = InvariantSearch()
+    for seconds in passes:
         undecided = []
         for subgroup in rest:
-            left = np.inf if deadline is None else deadline - time.monotonic()
+            left = inf if deadline is None else deadline - time.monotonic()
             if left <= 0:
-                return best
+                search.status = "limit"
+                return search
             program = invariant_program(formulation, subgroup)
             limit = None if cutoff is None else float(sign * cutoff)
-            options = TreeOptions(seconds=min(seconds, left), seed=seed, cutoff=limit)
+            options = TreeOptions(
+                seconds=None if min(seconds, left) == inf else min(seconds, left), seed=seed, cutoff=limit
+            )
             found = branch_and_cut(
                 program.formulation, invariant_objective(program, objective), options=options
             )
-            attempts += 1
+            search.attempts += 1
             if on_progress is not None:
                 on_progress({"stage": "invariant", "order": subgroup.order, "status": found.status})
             if found.columns is not None:
                 columns = program.expanded(found.columns)
                 value = objective.value(columns)
                 if cutoff is None or sign * value < cutoff:
-                    best = InvariantTriangulation(columns, value, subgroup, attempts)
+                    search.columns, search.value, search.subgroup = columns, value, subgroup
                     cutoff = sign * value
-            if found.status == "interrupted" or (
-                best is not None and goal is not None and cutoff is not None and cutoff <= goal
-            ):
-                return best
+            if found.status == "interrupted":
+                search.status = "interrupted"
+                return search
+            if search.value is not None and goal is not None and sign * search.value <= goal:
+                search.status = "goal"
+                return search
             if found.status == "limit":
                 undecided.append(subgroup)
         rest = undecided
-    return best
+    search.status = "limit" if rest else "decided"
+    return search
 
 
 def invariant_objective(program: InvariantProgram, objective: Objective) -> Objective:
     """Return the objective of the variables that stand for whole orbits."""
-    return replace(objective, numerators=objective.numerators[program.representatives] * program.lengths)
+    return objective.times(program.representatives, program.lengths)

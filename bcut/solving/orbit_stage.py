@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from bcut.bounds.orbit_cuts import OrbitCut, orbit_root_with_cuts
 from bcut.bounds.orbit_root import OrbitRoot, orbit_root
+from bcut.bounds.root import Round
 from bcut.errors import TooLargeError
 from bcut.formulations.formulation import Formulation
 from bcut.formulations.orbit_cocircuits import OrbitFormulation, orbit_formulation
@@ -46,6 +47,10 @@ class OrbitStage:
     root : OrbitRoot
     cuts : tuple of OrbitCut
         Those in the formulation.
+    rounds : tuple of Round
+        Of the cutting-plane loop.
+    separating : float
+        Seconds that it spent on finding cuts.
     """
 
     configuration: PointConfiguration
@@ -54,11 +59,24 @@ class OrbitStage:
     objective: Objective
     root: OrbitRoot
     cuts: tuple[OrbitCut, ...] = ()
+    rounds: tuple[Round, ...] = ()
+    separating: float = 0.0
 
     def columns_within(self, target: Fraction) -> int:
         """Count the simplices that a triangulation with ``sign * objective <= target`` may use."""
         assert self.root.bound is not None
         return int(self.formulation.sizes[self.root.bound.orbits_within(target)].sum())
+
+    def target_for(self, columns: int) -> Fraction:
+        """Return the largest target within which at most so many simplices are; below the bound if there is none."""
+        bound = self.root.bound
+        assert bound is not None
+        order = np.argsort(bound.reduced_costs, kind="stable")
+        within = np.flatnonzero(np.cumsum(self.formulation.sizes[order]) > columns)
+        if not len(within):
+            return bound.value + Fraction(int(bound.reduced_costs[order[-1]]), bound.denominator)
+        # Anything below the reduced cost of the first orbit that is too much.
+        return bound.value + Fraction(int(bound.reduced_costs[order[within[0]]]) - 1, bound.denominator)
 
     def with_link_cuts(self, *, rounds: int = 200, seconds: Callable[[], float] | None = None) -> OrbitStage:
         """Return the same stage after a cutting-plane loop with averaged link cuts.
@@ -76,8 +94,15 @@ class OrbitStage:
             or self.root.bound is None
             or found.root.bound.value <= self.root.bound.value
         ):
-            return self
-        return replace(self, formulation=found.formulation, root=found.root, cuts=tuple(found.cuts))
+            return replace(self, rounds=tuple(found.rounds), separating=found.separating)
+        return replace(
+            self,
+            formulation=found.formulation,
+            root=found.root,
+            cuts=tuple(found.cuts),
+            rounds=tuple(found.rounds),
+            separating=found.separating,
+        )
 
     def residual(self, target: Fraction, *, limit: int = MAX_COLUMNS) -> tuple[Formulation, Objective]:
         """Write down the program on the simplices that a triangulation within the target may use.

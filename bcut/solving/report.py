@@ -49,17 +49,16 @@ def make_result(
     if search.columns is not None:
         triangulation = search.whole.formulation.simplices[np.sort(search.columns)].tolist()
         with search.timed("verify"):
-            _verify(configuration, triangulation, question.spanning)
+            _verify(configuration, triangulation, question)
     search.seconds["total"] = time.perf_counter() - started
-    objective = search.whole.objective
-    proven = None if search.bound is None else search.sign * objective.rounded_up(search.bound)
+    proven = proven_bound(search)
     return Result(
         instance=_describe_instance(configuration),
         problem=question,
         status=search.status,
-        value=_number(search.value),
-        bound=_number(proven),
-        gap=_gap(search.value, proven),
+        value=as_number(search.value),
+        bound=as_number(proven),
+        gap=gap(search.value, proven),
         root=Root(
             search.lp,
             search.lp_after_cuts,
@@ -76,16 +75,21 @@ def make_result(
     )
 
 
-def _verify(configuration: PointConfiguration, triangulation: list[list[int]], spanning: bool) -> None:
+def _verify(configuration: PointConfiguration, triangulation: list[list[int]], question: Question) -> None:
     from bcut.errors import VerificationError
+    from bcut.verification.dissection import check_dissection
+    from bcut.verification.restrictions import RestrictionData
     from bcut.verification.triangulation import check_triangulation
 
+    check = check_dissection if question.dissection else check_triangulation
+    asked = RestrictionData(
+        tuple(map(tuple, question.require)), tuple(map(tuple, question.forbid)), question.star
+    )
     try:
-        check_triangulation(configuration.scalars(), triangulation, spanning=spanning)
+        asked.check(check(configuration.scalars(), triangulation, spanning=question.spanning).simplices)
     except VerificationError as error:
-        raise SolverError(
-            f"{configuration.name}: the solver's answer is no triangulation: {error}"
-        ) from error
+        what = "dissection" if question.dissection else "triangulation"
+        raise SolverError(f"{configuration.name}: the solver's answer is no {what}: {error}") from error
 
 
 def _describe_instance(configuration: PointConfiguration) -> Instance:
@@ -97,13 +101,22 @@ def _record(stage: str, finished: Any) -> RoundRecord:
     return RoundRecord(finished.lp, finished.cuts, stage)
 
 
-def _number(value: Fraction | None) -> int | float | None:
+def proven_bound(search: Search) -> Fraction | None:
+    """Return the bound on the objective, rounded to a value that it can have."""
+    if search.bound is None:
+        return None
+    return search.sign * search.whole.objective.rounded_up(search.bound)
+
+
+def as_number(value: Fraction | None) -> int | float | None:
+    """Return a number as a result file holds it."""
     if value is None:
         return None
     return int(value) if value.denominator == 1 else float(value)
 
 
-def _gap(value: Fraction | None, proven: Fraction | None) -> float | None:
+def gap(value: Fraction | None, proven: Fraction | None) -> float | None:
+    """Return ``|value - bound| / max(1, |value|)``."""
     if value is None or proven is None:
         return None
     return abs(float(value - proven)) / max(1.0, abs(float(value)))

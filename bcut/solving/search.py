@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.root import RootBound, RootLimits, Round, root_bound
+from bcut.bounds.root import RootBound, RootLimits, Round, Stage, root_bound
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.placing import placing_triangulation
@@ -68,10 +68,14 @@ class Search:
         The best triangulation found.
     bound : Fraction or None
         Proven bound on ``sign * objective``.
+    restricted : bool
+        Whether there may be no solution at all.
     exact : SafeBound or None
         Exact bound of the relaxation of the whole, without cuts.
+    refutation : (Fraction, tuple of Stage) or None
+        The last target that was refuted, and the proof, where the relaxations alone make one.
     certificate : Certificate or None
-        Of a bound over orbits.
+        Of a bound over orbits, or of a threshold.
     """
 
     whole: Part
@@ -83,7 +87,9 @@ class Search:
     status: Status = "limit"
     columns: NDArray[np.intp] | None = None
     bound: Fraction | None = None
+    restricted: bool = False
     exact: SafeBound | None = None
+    refutation: tuple[Fraction, tuple[Stage, ...]] | None = None
     certificate: Certificate | None = None
     lp: float | None = None
     lp_after_cuts: float | None = None
@@ -147,9 +153,16 @@ class Search:
 
 
 def place(search: Search) -> None:
-    """Offer the placing triangulation: it costs next to nothing, and whatever comes, there is one to hand out."""
+    """Find the placing triangulation: it costs next to nothing, and whatever comes, there is one to hand out.
+
+    Where a triangulation is known there is one already, and another one may break what earlier objectives settled.
+    """
+    if search.columns is not None:
+        return
     whole = search.whole.formulation
-    search.offer(whole.columns_of(placing_triangulation(whole.configuration, whole.chirotope)))
+    columns = whole.columns_of(placing_triangulation(whole.configuration, whole.chirotope))
+    if (columns >= 0).all():
+        search.offer(columns)
 
 
 def bound_at_root(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal
 
+from bcut.bounds.root import RootBound, Stage
 from bcut.solving.search import Part, Search, bound_at_root, branch, place
 
 # A value within this relative distance of the bound counts as optimal where values are not integral.
@@ -22,6 +23,7 @@ def solve_by_targets(search: Search) -> None:
     """
     root = bound_at_root(search, search.whole, None)
     if root.first is None:
+        _note_infeasible(search, root)
         return
     search.exact = root.first
     objective = search.whole.objective
@@ -35,10 +37,15 @@ def solve_by_targets(search: Search) -> None:
         if search.value is not None:
             target = min(target, search.sign * search.value - unit)
         columns = search.exact.columns_within(target)
-        outcome = _reach(search, search.whole.restricted_to(columns), target)
+        outcome, stages = _reach(search, search.whole.restricted_to(columns), target)
         if outcome == "refuted":
             refuted += 1
+            search.refutation = (target, tuple(stages)) if stages else None
             search.raise_bound(target + unit)
+            if search.restricted and search.value is None:
+                # There may be no solution at all, and then no target is the last one.
+                solve_at_once(search)
+                return
         elif outcome == "reached":
             assert search.value is not None
             search.raise_bound(search.sign * search.value)
@@ -56,35 +63,39 @@ def is_optimal(search: Search) -> bool:
 
 def _reach(
     search: Search, part: Part, target: Fraction
-) -> Literal["reached", "refuted", "limit", "interrupted"]:
-    """Find a best triangulation on a part that contains all those with at most the target value (times sign)."""
+) -> tuple[Literal["reached", "refuted", "limit", "interrupted"], list[Stage]]:
+    """Find a best triangulation on a part that contains all those with at most the target value (times sign).
+
+    Where the relaxations alone refute the target, the stages are the proof.
+    """
     root = bound_at_root(search, part, search.separation(part), target=target)
     search.columns_after_fixing = len(root.columns)
     if root.status in ("infeasible", "target"):
-        return "refuted"
+        return "refuted", root.stages
     objective = search.whole.objective
     if root.status == "integral" and root.last is not None and search.value is not None:
         # An optimum of the part, up to the accuracy of the relaxation; the exact bound decides whether it is.
         value, proven = search.sign * search.value, objective.rounded_up(root.last.value)
         if value <= min(target, proven):
-            return "reached"
+            return "reached", []
         if proven > target:
-            return "refuted"
+            return "refuted", root.stages
     if search.seconds_left == 0.0:
-        return "limit"
+        return "limit", []
     # SCIP keeps solutions strictly better than the cutoff; no other value lies within half a unit of the target.
     status = branch(search, part, root, cutoff=float(search.sign * (target + objective.unit / 2)))
     if status == "infeasible":
-        return "refuted"
+        return "refuted", []
     if status == "optimal" or is_optimal(search):
-        return "reached"
-    return "interrupted" if status == "interrupted" else "limit"
+        return "reached", []
+    return "interrupted" if status == "interrupted" else "limit", []
 
 
 def solve_at_once(search: Search) -> None:
     """Cut the relaxation of all columns, then hand it to SCIP with its cuts: any objective."""
     root = bound_at_root(search, search.whole, search.separation(search.whole))
-    if root.first is None or root.last is None:
+    if root.status == "infeasible" or root.first is None or root.last is None:
+        _note_infeasible(search, root)
         return
     search.exact = root.first
     search.raise_bound(root.last.value)
@@ -103,11 +114,18 @@ def solve_in_scip(search: Search) -> None:
     _finish(search, branch(search, search.whole, None))
 
 
+def _note_infeasible(search: Search, root: RootBound) -> None:
+    if root.status == "infeasible":
+        search.status = "infeasible"
+
+
 def _is_close(search: Search) -> bool:
     value, bound = search.value, search.bound
     if value is None or bound is None:
         return False
-    size = max(search.whole.objective.largest_cost, abs(float(value)))
+    # No more than the gap that verification accepts, which is relative to the value, or to 1 where that is smaller.
+    size = abs(float(value))
+    size = min(max(search.whole.objective.largest_cost, size), max(1.0, size))
     return float(search.sign * value - bound) <= RELATIVE_GAP * size
 
 

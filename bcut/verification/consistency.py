@@ -45,11 +45,13 @@ def check_consistency(data: ResultData, value: Fraction | None, *, integral: boo
     VerificationError
         A contradiction.
     """
-    if data.status == "infeasible":
+    if data.status == "infeasible" and not data.restrictions and data.invariant_under is None:
         raise VerificationError(
             "its status is 'infeasible', but every point configuration has a triangulation, "
             "and one that uses all points"
         )
+    if data.status == "infeasible" and value is not None:
+        raise VerificationError("its status is 'infeasible', but it contains a triangulation")
     if value is None:
         if data.status == "optimal":
             raise VerificationError("its status is 'optimal', but it contains no triangulation")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from bcut.errors import ResultError
+from bcut.errors import ResultError, VerificationError
+from bcut.objectives.syntax import MeasureName
 from bcut.verification.exact_points import Simplex
 
 if TYPE_CHECKING:
@@ -16,11 +17,15 @@ if TYPE_CHECKING:
 Cost = int | Fraction
 
 
+class UnknownCostError(VerificationError):
+    """A simplex whose cost is not in the file."""
+
+
 @dataclass(frozen=True)
 class CostTable:
-    """The costs that a result file embeds: a default, and exceptions by ascending vertices."""
+    """The costs that a result file embeds: a default, None where there is none, and others by ascending vertices."""
 
-    default: Fraction
+    default: Fraction | None
     costs: Mapping[Simplex, Fraction]
 
 
@@ -34,10 +39,13 @@ class Costs:
         Maps a list of ascending simplices to their costs.
     integral : bool
         Whether every simplex is known to have an integral cost, even those that nobody has looked at.
+    admits : callable, optional
+        Tells for each of a list of simplices whether it may be used at all; all may without it.
     """
 
     of: Callable[[Sequence[Simplex]], Sequence[Cost]]
     integral: bool
+    admits: Callable[[Sequence[Simplex]], Sequence[bool]] | None = None
 
 
 def costs_of_objective(objective: str, table: CostTable | None, configuration: PointConfiguration) -> Costs:
@@ -51,7 +59,7 @@ def costs_of_objective(objective: str, table: CostTable | None, configuration: P
     objective : str
         As in a result file: the name of a measure, with its argument behind a colon.
     table : CostTable, optional
-        For ``costs:FILE``; the file itself is not read.
+        For ``costs:FILE`` and functions in files; the files themselves are not read.
     configuration : PointConfiguration
 
     Raises
@@ -63,16 +71,14 @@ def costs_of_objective(objective: str, table: CostTable | None, configuration: P
     """
     if objective == "cardinality":
         return Costs(lambda simplices: [1] * len(simplices), integral=True)
-    if objective.partition(":")[0] == "costs":
+    if objective.partition(":")[0] == "costs" or MeasureName.parse(objective).is_file:
         if table is None:
             raise ResultError(
                 f"problem.costs is missing, so the values of objective '{objective}' cannot be re-computed; "
                 "solve the instance again, then the table of costs is written into the result"
             )
-        integral = all(cost.denominator == 1 for cost in (table.default, *table.costs.values()))
-        return Costs(
-            lambda simplices: [table.costs.get(simplex, table.default) for simplex in simplices], integral
-        )
+        listed = (*table.costs.values(), *([] if table.default is None else [table.default]))
+        return Costs(_looked_up(table), integral=all(cost.denominator == 1 for cost in listed))
     return Costs(_registered_measure(objective, configuration), integral=False)
 
 
@@ -81,10 +87,9 @@ def _registered_measure(
 ) -> Callable[[Sequence[Simplex]], Sequence[Cost]]:
     import numpy as np
 
-    from bcut.objectives.measures import MEASURES
+    from bcut.objectives.measures import MEASURES, exact, measured
 
-    name, _, argument = objective.partition(":")
-    if name not in MEASURES:
+    if objective.partition(":")[0] not in MEASURES:
         raise ResultError(
             f"problem.objective is '{objective}', a measure that this version does not know; "
             "verify the result with the version of bcut that wrote it"
@@ -92,7 +97,19 @@ def _registered_measure(
 
     def of(simplices: Sequence[Simplex]) -> Sequence[Cost]:
         rows = np.array(simplices, dtype=np.int64).reshape(len(simplices), configuration.dimension + 1)
-        costs = MEASURES[name](configuration, rows, argument)
-        return costs.tolist() if isinstance(costs, np.ndarray) else costs
+        return exact(measured(objective, configuration, rows))
+
+    return of
+
+
+def _looked_up(table: CostTable) -> Callable[[Sequence[Simplex]], Sequence[Cost]]:
+    def of(simplices: Sequence[Simplex]) -> Sequence[Cost]:
+        found = []
+        for simplex in simplices:
+            cost = table.costs.get(simplex, table.default)
+            if cost is None:
+                raise UnknownCostError(f"the cost of simplex {list(simplex)} is not in the file")
+            found.append(cost)
+        return found
 
     return of

@@ -32,6 +32,7 @@ from bcut.errors import VerificationError
 from bcut.geometry.numbers import AlgebraicNumber
 from bcut.verification.certificate import CertificateData, CertifiedBound, check_claim, check_cuts, check_flag
 from bcut.verification.costs import Costs, CostTable
+from bcut.verification.cuts import Candidates
 from bcut.verification.exact_points import ExactPoints, SideTable, Simplex, mask_of, without
 from bcut.verification.hull import hull_volume
 from bcut.verification.symmetries import SetOrbits, check_symmetries
@@ -76,7 +77,7 @@ def certified_orbit_bound(
     needed = comb(n, d + 1) if certificate.cuts else comb(n, d)
     if needed > max_table:
         return CertifiedBound(None, obstacle=f"it takes a table of {needed:,} sets of points")
-    sides = SideTable(points)
+    sides = Candidates(points, spanning=spanning)
     check_flag(sides, certificate.flag)
     assert certificate.symmetries is not None
     symmetries = check_symmetries(points, certificate.symmetries, certificate.flag)

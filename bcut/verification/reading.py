@@ -6,17 +6,18 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
 from bcut.errors import ResultError
-from bcut.verification.certificate import CertificateData
+from bcut.verification.certificate import CertificateData, RefutationData
 from bcut.verification.costs import CostTable
 from bcut.verification.cuts import CertificateCut
 from bcut.verification.exact_points import Simplex
+from bcut.verification.restrictions import RestrictionData
 
 SCHEMA = 1
 STATUSES = ("optimal", "infeasible", "limit", "interrupted", "bound")
@@ -44,6 +45,20 @@ class FileNumber:
 
 
 @dataclass(frozen=True)
+class LevelData:
+    """A further objective, and what was found by it; status is None where it was not begun."""
+
+    objective: str
+    sense: str
+    costs: CostTable | None
+    status: str | None
+    value: FileNumber | None
+    bound: FileNumber | None
+    gap: Fraction | None
+    certificate: CertificateData | None
+
+
+@dataclass(frozen=True)
 class ResultData:
     """The parts of a result file that verification needs, with their types checked and nothing else."""
 
@@ -61,6 +76,10 @@ class ResultData:
     gap: Fraction | None
     triangulation: list[list[int]] | None
     certificate: CertificateData | None
+    invariant_under: tuple[tuple[Simplex, ...], ...] | None = None
+    dissection: bool = False
+    restrictions: RestrictionData = field(default_factory=RestrictionData)
+    then: tuple[LevelData, ...] = ()
 
 
 def load_result(source: Source) -> tuple[ResultData, str]:
@@ -138,12 +157,16 @@ class _Reader:
             sense=self.choice(problem, "problem.sense", ("min", "max")),
             spanning=self.boolean(problem, "problem.spanning"),
             costs=self.costs(problem.get("costs")),
+            invariant_under=self.groups(problem.get("invariant_under"), "problem.invariant_under"),
+            dissection=self.flag(problem, "problem.dissection"),
+            restrictions=self.restrictions(problem),
             status=self.choice(data, "status", STATUSES),
             value=self.optional_number(data, "value"),
             bound=self.optional_number(data, "bound"),
             gap=None if (gap := self.optional_number(data, "gap")) is None else gap.exact,
             triangulation=self.triangulation(self.entry(data, "triangulation")),
             certificate=self.certificate(self.entry(data, "certificate")),
+            then=self.levels(data, problem),
         )
 
     def refuse(self, where: str, expected: str, found: Any) -> NoReturn:
@@ -239,10 +262,9 @@ class _Reader:
             self.refuse(where, "vertices are ascending here", value)
         return vertices
 
-    def costs(self, value: Any) -> CostTable | None:
+    def costs(self, value: Any, where: str = "problem.costs") -> CostTable | None:
         if value is None:
             return None
-        where = "problem.costs"
         if not isinstance(value, Mapping):
             self.refuse(where, "this is a JSON object", value)
         table: dict[Simplex, Fraction] = {}
@@ -255,7 +277,8 @@ class _Reader:
             if vertices in table:
                 self.refuse(place, "each simplex has one cost", entry)
             table[vertices] = self.number(cost, place).exact
-        return CostTable(self.number(self.entry(value, f"{where}.default"), f"{where}.default").exact, table)
+        default = self.optional_number(value, f"{where}.default")
+        return CostTable(None if default is None else default.exact, table)
 
     def pair(self, value: Any, where: str, expected: str) -> tuple[Any, Any]:
         entries = self.list_of(value, where, expected)
@@ -263,10 +286,37 @@ class _Reader:
             self.refuse(where, expected, value)
         return entries[0], entries[1]
 
-    def certificate(self, value: Any) -> CertificateData | None:
+    def levels(self, data: Mapping[str, Any], problem: Mapping[str, Any]) -> tuple[LevelData, ...]:
+        """Read the further objectives, and what was found by each; older files have none."""
+        asked = self.list_of(problem.get("then", []), "problem.then", "this is a list of objectives")
+        found = self.list_of(
+            data.get("then", []), "then", "this is a list, one entry for each of problem.then"
+        )
+        if len(asked) != len(found):
+            self.refuse("then", f"this is a list of {len(asked)}, one entry for each of problem.then", found)
+        return tuple(self.level(*pair, number) for number, pair in enumerate(zip(asked, found, strict=True)))
+
+    def level(self, question: Any, record: Any, number: int) -> LevelData:
+        where, asked = f"then[{number}]", f"problem.then[{number}]"
+        for value, place in ((record, where), (question, asked)):
+            if not isinstance(value, Mapping):
+                self.refuse(place, "this is a JSON object", value)
+        begun = self.entry(record, f"{where}.status") is not None
+        gap = self.optional_number(record, f"{where}.gap")
+        return LevelData(
+            objective=self.text(question, f"{asked}.objective"),
+            sense=self.choice(question, f"{asked}.sense", ("min", "max")),
+            costs=self.costs(question.get("costs"), f"{asked}.costs"),
+            status=self.choice(record, f"{where}.status", STATUSES) if begun else None,
+            value=self.optional_number(record, f"{where}.value"),
+            bound=self.optional_number(record, f"{where}.bound"),
+            gap=None if gap is None else gap.exact,
+            certificate=self.certificate(self.entry(record, f"{where}.certificate"), f"{where}.certificate"),
+        )
+
+    def certificate(self, value: Any, where: str = "certificate") -> CertificateData | None:
         if value is None:
             return None
-        where = "certificate"
         if not isinstance(value, Mapping):
             self.refuse(where, "this is a JSON object or null", value)
         bound = self.entry(value, f"{where}.bound")
@@ -275,7 +325,11 @@ class _Reader:
             return CertificateData(None, reason=reason if isinstance(reason, str) else "")
         symmetries = self.symmetries(value.get("symmetries"), f"{where}.symmetries")
         row = "coverage" if symmetries is None else "volume"
-        named, cocircuits = self.multipliers(self.entry(value, f"{where}.multipliers"), row)
+        threshold = value.get("threshold")
+        earlier = self.list_of(value.get("earlier", []), f"{where}.earlier", "this is a list of multipliers")
+        named, cocircuits, chambers = self.multipliers(
+            self.entry(value, f"{where}.multipliers"), row, f"{where}.multipliers"
+        )
         cuts = self.list_of(value.get("cuts", []), f"{where}.cuts", "this is a list of cuts")
         return CertificateData(
             bound=self.rational(bound, f"{where}.bound"),
@@ -283,21 +337,63 @@ class _Reader:
             coverage=Fraction(0) if symmetries is not None else named,
             volume=Fraction(0) if symmetries is None else named,
             cocircuits=cocircuits,
+            chambers=chambers,
             symmetries=symmetries,
             volume_coefficient=self.integer(
                 value.get("volume_coefficient") or 0, f"{where}.volume_coefficient"
             ),
             cuts=tuple(self.cut(cut, f"{where}.cuts[{index}]") for index, cut in enumerate(cuts)),
+            infeasible=self.flag(value, f"{where}.infeasible"),
+            refutes=self.refutation(value.get("refutes"), f"{where}.refutes"),
+            threshold=None if threshold is None else self.rational(threshold, f"{where}.threshold"),
+            earlier=tuple(self.rational(text, f"{where}.earlier") for text in earlier),
         )
 
-    def multipliers(self, value: Any, named: str) -> tuple[Fraction, dict[Simplex, Fraction]]:
-        """Read the multipliers of the one row with a name, and of the cocircuit rows."""
+    def refutation(self, value: Any, where: str) -> RefutationData | None:
+        if value is None:
+            return None
+        if not isinstance(value, Mapping):
+            self.refuse(where, "this is a JSON object or null", value)
+        listed = self.list_of(
+            self.entry(value, f"{where}.stages"), f"{where}.stages", "this is a list of stages"
+        )
+        stages = []
+        for index, stage in enumerate(listed):
+            place = f"{where}.stages[{index}]"
+            if not isinstance(stage, Mapping):
+                self.refuse(place, "this is a JSON object", stage)
+            coverage, cocircuits, _ = self.multipliers(
+                self.entry(stage, f"{place}.multipliers"), "coverage", f"{place}.multipliers"
+            )
+            cuts = self.list_of(stage.get("cuts", []), f"{place}.cuts", "this is a list of cuts")
+            stages.append(
+                CertificateData(
+                    bound=None,
+                    coverage=coverage,
+                    cocircuits=cocircuits,
+                    cuts=tuple(self.cut(cut, f"{place}.cuts[{k}]") for k, cut in enumerate(cuts)),
+                )
+            )
+        target = self.rational(self.entry(value, f"{where}.target"), f"{where}.target")
+        return RefutationData(target, tuple(stages))
+
+    def multipliers(
+        self, value: Any, named: str, place: str
+    ) -> tuple[Fraction, dict[Simplex, Fraction], dict[Simplex, Fraction]]:
+        """Read the multipliers of the one row with a name, of the cocircuit rows, and of generic points by flags."""
         of_named: Fraction | None = None
         cocircuits: dict[Simplex, Fraction] = {}
-        for index, entry in enumerate(self.list_of(value, "certificate.multipliers", "this is a list")):
-            where = f"certificate.multipliers[{index}]"
+        chambers: dict[Simplex, Fraction] = {}
+        for index, entry in enumerate(self.list_of(value, place, "this is a list")):
+            where = f"{place}[{index}]"
             row, text = self.pair(entry, where, "this is a pair of a row and its multiplier")
             multiplier = self.rational(text, where)
+            if isinstance(row, Mapping):
+                flag = tuple(self.vertices(self.entry(row, f"{where}.flag"), f"{where}.flag"))
+                if flag in chambers:
+                    self.refuse(where, "each row has one multiplier", entry)
+                chambers[flag] = multiplier
+                continue
             facet = None if row == named else self.ascending(row, where)
             if facet in cocircuits or (facet is None and of_named is not None):
                 self.refuse(where, "each row has one multiplier", entry)
@@ -305,7 +401,31 @@ class _Reader:
                 of_named = multiplier
             else:
                 cocircuits[facet] = multiplier
-        return of_named or Fraction(0), cocircuits
+        return of_named or Fraction(0), cocircuits, chambers
+
+    def flag(self, data: Mapping[str, Any], where: str) -> bool:
+        """Read a truth value that older files lack."""
+        return self.boolean(data, where) if where.rpartition(".")[2] in data else False
+
+    def restrictions(self, problem: Mapping[str, Any]) -> RestrictionData:
+        star = problem.get("star")
+        return RestrictionData(
+            require=self.faces(problem.get("require", []), "problem.require"),
+            forbid=self.faces(problem.get("forbid", []), "problem.forbid"),
+            star=None if star is None else self.integer(star, "problem.star"),
+            dissection=self.flag(problem, "problem.dissection"),
+        )
+
+    def faces(self, value: Any, where: str) -> tuple[Simplex, ...]:
+        return tuple(
+            self.ascending(face, where) for face in self.list_of(value, where, "this is a list of faces")
+        )
+
+    def groups(self, value: Any, where: str) -> tuple[tuple[Simplex, ...], ...] | None:
+        if value is None:
+            return None
+        listed = self.list_of(value, where, "this is a list of groups, each a list of permutations")
+        return tuple(self.symmetries(group, f"{where}[{i}]") or () for i, group in enumerate(listed))
 
     def symmetries(self, value: Any, where: str) -> tuple[Simplex, ...] | None:
         if value is None:

@@ -93,7 +93,7 @@ def check_triangulation(
         With the first reason found, which names the simplices, facets or points.
     """
     exact = points if isinstance(points, ExactPoints) else ExactPoints(points)
-    listed = _listed(simplices, exact)
+    listed = listed_simplices(simplices, exact)
     check = _Check(exact, listed)
     check.flatness()
     check.facets()
@@ -111,7 +111,7 @@ def check_triangulation(
     )
 
 
-def _listed(simplices: Iterable[Sequence[int]], points: ExactPoints) -> list[Simplex]:
+def listed_simplices(simplices: Iterable[Sequence[int]], points: ExactPoints) -> list[Simplex]:
     """Return the simplices with ascending vertices, once they are known to be sets of points, none twice."""
     size, last = points.dimension + 1, points.n - 1
     first: dict[Simplex, int] = {}
@@ -226,17 +226,18 @@ class _Check:
 
     def _volume_share(self) -> str:
         """Say how the volumes compare with the hull's, and what follows."""
-        share = (
-            self.total / self.hull
-            if isinstance(self.hull, AlgebraicNumber)
-            else Fraction(self.total, self.hull)
-        )
-        if share == 1:
-            return "their volumes add up to the hull's, so some overlap or do not meet face to face"
-        if share > 1:
-            return f"their volumes add up to {_share_text(share)} of the hull's, so some overlap"
-        missing = _share_text(1 - share)
-        return f"their volumes add up to {_share_text(share)} of the hull's: {missing} is missing"
+        return volume_share(self.total, self.hull)
+
+
+def volume_share(total: Any, hull: Any) -> str:
+    """Say how the volumes of simplices compare with that of the hull, and what follows."""
+    share = total / hull if isinstance(hull, AlgebraicNumber) else Fraction(total, hull)
+    if share == 1:
+        return "their volumes add up to the hull's, so some overlap or do not meet face to face"
+    if share > 1:
+        return f"their volumes add up to {_share_text(share)} of the hull's, so some overlap"
+    missing = _share_text(1 - share)
+    return f"their volumes add up to {_share_text(share)} of the hull's: {missing} is missing"
 
 
 def _share_text(share: Fraction | AlgebraicNumber) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bcut.errors import ConfigurationError, InputError, ResultError, VerificationError
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.numbers import parse_coordinate
-from bcut.verification.certificate import MAX_SUBSETS, CertifiedBound, certified_bound
+from bcut.verification.certificate import MAX_SUBSETS, CertificateData, CertifiedBound, certified_bound
 from bcut.verification.consistency import (
     RELATIVE_GAP,
     check_consistency,
@@ -17,11 +18,24 @@ from bcut.verification.consistency import (
     rounded,
     shown,
 )
-from bcut.verification.costs import Costs, costs_of_objective
-from bcut.verification.exact_points import ExactPoints
+from bcut.verification.costs import Costs
+from bcut.verification.dissection import check_dissection
+from bcut.verification.exact_points import ExactPoints, Simplex
+from bcut.verification.goals import Certifier, Goal, Settled, certify
 from bcut.verification.orbit_certificate import MAX_TABLE, certified_orbit_bound, is_invariant
 from bcut.verification.reading import ResultData, Source, load_result
 from bcut.verification.triangulation import check_triangulation
+
+
+@dataclass(frozen=True)
+class GoalVerification:
+    """What holds of one objective, exactly; attributes as in `Verification`."""
+
+    statement: str
+    value: Fraction | None = None
+    exact_bound: Fraction | None = None
+    rounded_bound: Fraction | None = None
+    proven_optimal: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,6 +56,9 @@ class Verification:
         Whether the value reaches `rounded_bound`: a complete proof without trust in any solver.
     checks : list of str
         What was checked, in order.
+    further : list of GoalVerification
+        Of the further objectives of a lexicographic combination: value and bounds above are those of the first, and
+        `proven_optimal` is about all of them.
     """
 
     statement: str
@@ -50,6 +67,7 @@ class Verification:
     rounded_bound: Fraction | None = None
     proven_optimal: bool = False
     checks: list[str] = field(default_factory=list)
+    further: list[GoalVerification] = field(default_factory=list)
 
 
 def verify(result: Source, *, max_subsets: int | None = None) -> Verification:
@@ -97,27 +115,96 @@ class _Verifier:
     def __init__(self, data: ResultData, max_subsets: int | None) -> None:
         self.data, self.max_subsets = data, max_subsets
         self.checks: list[str] = []
+        self.simplices: Sequence[Simplex] = ()
 
     def run(self) -> Verification:
         data = self.data
         configuration = self._configuration()
         points = ExactPoints([[parse_coordinate(text) for text in point] for point in data.points])
-        costs = costs_of_objective(data.objective, data.costs, configuration)
-        value = self._value(points, costs)
-        certified = self._certified(points, costs)
-        integral = costs.integral or (certified is not None and certified.integral)
+        data.restrictions.check_points(points.n, points.dimension)
+        goal = Goal.of(data.objective, data.sense, data.costs, configuration)
+        value = self._value(points, goal)
+        if data.certificate is not None and data.certificate.infeasible:
+            return self._infeasible(points, data.certificate)
+        first = self._of_goal(data, points, goal, value)
+        if not data.then:
+            return Verification(**vars(first), checks=self.checks)
+        further = self._further(points, configuration, Settled(goal, value)) if value is not None else []
+        proven = first.proven_optimal and len(further) == len(data.then)
+        return Verification(
+            statement=self._whole_statement(first, further),
+            value=value,
+            exact_bound=first.exact_bound,
+            rounded_bound=first.rounded_bound,
+            proven_optimal=proven and all(level.proven_optimal for level in further),
+            checks=self.checks,
+            further=further,
+        )
+
+    def _of_goal(
+        self,
+        data: ResultData,
+        points: ExactPoints,
+        goal: Goal,
+        value: Fraction | None,
+        earlier: Sequence[Settled] = (),
+    ) -> GoalVerification:
+        """Check what a result says of one objective."""
+        certified = self._certified(data, points, goal, earlier)
+        integral = goal.costs.integral or (certified is not None and certified.integral)
         check_consistency(data, value, integral=integral)
         self.checks.append(f"status '{data.status}', value, bound and gap do not contradict each other")
         exact = None if certified is None else certified.bound
         best = None if exact is None else rounded(exact, data.sense, integral)
-        return Verification(
-            statement=self._statement(value, best, certified),
+        return GoalVerification(
+            statement=self._statement(data, value, best, certified),
             value=value,
             exact_bound=exact,
             rounded_bound=best,
             proven_optimal=value is not None and best is not None and not is_better(best, value, data.sense),
-            checks=self.checks,
         )
+
+    def _further(
+        self, points: ExactPoints, configuration: PointConfiguration, first: Settled
+    ) -> list[GoalVerification]:
+        """Check the further objectives, each with the values of those before it."""
+        settled, found = [first], []
+        for number, level in enumerate(self.data.then):
+            if level.status is None:
+                if self.data.status == "optimal":
+                    raise VerificationError(f"its status is 'optimal', but then[{number}] was not begun")
+                break
+            if self.data.status == "optimal" and level.status != "optimal":
+                raise VerificationError(
+                    f"its status is 'optimal', but that of then[{number}] is '{level.status}'"
+                )
+            goal = Goal.of(level.objective, level.sense, level.costs, configuration)
+            value = goal.value(self.simplices)
+            self.checks.append(f"their {level.objective} is {shown(value)}")
+            data = replace(
+                self.data,
+                objective=level.objective,
+                sense=level.sense,
+                status=level.status,
+                value=level.value,
+                bound=level.bound,
+                gap=level.gap,
+                certificate=level.certificate,
+            )
+            try:
+                found.append(self._of_goal(data, points, goal, value, settled))
+            except VerificationError as error:
+                raise VerificationError(f"then[{number}] ({level.objective}): {error}") from None
+            settled.append(Settled(goal, value))
+        return found
+
+    def _whole_statement(self, first: GoalVerification, further: Sequence[GoalVerification]) -> str:
+        """Say of every objective what holds."""
+        statements = [f"by {self.data.objective}: {first.statement}"]
+        for number, level in enumerate(self.data.then):
+            text = further[number].statement if number < len(further) else "not begun"
+            statements.append(f"then by {level.objective}: {text}")
+        return ". ".join(statements)
 
     def _configuration(self) -> PointConfiguration:
         """Read the points, and compare what the result says of them."""
@@ -143,69 +230,165 @@ class _Verifier:
         )
         return configuration
 
-    def _value(self, points: ExactPoints, costs: Costs) -> Fraction | None:
+    def _value(self, points: ExactPoints, goal: Goal) -> Fraction | None:
         """Check the triangulation, and add up its costs."""
         data = self.data
         if data.triangulation is None:
             return None
-        report = check_triangulation(points, data.triangulation, spanning=data.spanning)
+        check = check_dissection if data.dissection else check_triangulation
+        report = check(points, data.triangulation, spanning=data.spanning)
         uses = "all points" if not report.unused else f"{points.n - len(report.unused)} of {points.n} points"
         self.checks.append(
-            f"{len(report.simplices)} simplices with {uses} as vertices meet face to face, "
-            "and have the hull's volume"
+            f"{len(report.simplices)} simplices with {uses} as vertices "
+            f"{'do not overlap' if data.dissection else 'meet face to face'}, and have the hull's volume"
         )
-        value = sum(map(Fraction, costs.of(report.simplices)), Fraction(0))
+        if data.restrictions:
+            data.restrictions.check(report.simplices)
+            self.checks.append("they have the faces that are required, and none that is forbidden")
+        if data.invariant_under is not None:
+            self._check_invariance(report.simplices, data.invariant_under)
+        self.simplices = report.simplices
+        value = goal.value(report.simplices)
         self.checks.append(f"their {data.objective} is {shown(value)}")
         return value
 
-    def _certified(self, points: ExactPoints, costs: Costs) -> CertifiedBound | None:
-        """Re-compute the bound of the certificate; None where there is no such claim."""
+    def _check_invariance(
+        self, simplices: Sequence[Simplex], groups: Sequence[Sequence[Sequence[int]]]
+    ) -> None:
+        """Refuse a triangulation that none of some groups leaves invariant."""
+        known = set(simplices)
+        try:
+            invariant = any(
+                all(
+                    tuple(sorted(permutation[v] for v in simplex)) in known
+                    for permutation in group
+                    for simplex in simplices
+                )
+                for group in groups
+            )
+        except IndexError:
+            invariant = False
+        if not invariant:
+            raise VerificationError(
+                "the triangulation is not invariant under the symmetries in problem.invariant_under"
+            )
+        self.checks.append("the triangulation is invariant under the symmetries asked for")
+
+    def _infeasible(self, points: ExactPoints, certificate: CertificateData) -> Verification:
+        """Re-compute a proof that there is no triangulation: a positive bound on the value 0 of each."""
         data = self.data
+        if data.status != "infeasible" or data.dissection or certificate.symmetries is not None:
+            raise VerificationError(
+                "its certificate claims that there is no triangulation, but the rest of the result does not"
+            )
+        check_consistency(data, None, integral=False)
+        certified = certified_bound(
+            points,
+            certificate,
+            Costs(lambda simplices: [0] * len(simplices), integral=True),
+            sense="min",
+            spanning=data.spanning,
+            restrictions=data.restrictions,
+            max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+        )
+        if certified.bound is None:
+            return Verification(
+                f"infeasible according to the solver; the proof was not re-checked: {certified.obstacle}",
+                checks=self.checks,
+            )
+        if certified.bound <= 0:
+            raise VerificationError(
+                "its certificate claims that there is no triangulation, but proves nothing"
+            )
+        self.checks.append(
+            f"the multipliers prove that no choice of the {certified.candidates:,} candidate simplices "
+            "is a triangulation"
+        )
+        return Verification(
+            "infeasible, proven exactly: there is no triangulation with the faces that are asked for",
+            checks=self.checks,
+        )
+
+    def _certified(
+        self, data: ResultData, points: ExactPoints, goal: Goal, earlier: Sequence[Settled]
+    ) -> CertifiedBound | None:
+        """Re-compute the bound of the certificate; None where there is no such claim."""
         if data.certificate is None or data.certificate.bound is None:
             return None
         symmetries = data.certificate.symmetries
+        if data.dissection and (
+            data.certificate.cocircuits or data.certificate.cuts or symmetries is not None
+        ):
+            raise VerificationError(
+                "its certificate uses rows that triangulations satisfy, but the problem is about dissections"
+            )
+        if symmetries is not None and data.restrictions:
+            raise VerificationError(
+                "its certificate is one over orbits, but required and forbidden faces break symmetries"
+            )
+        if symmetries is not None and (goal.is_bottleneck or earlier):
+            raise VerificationError("its certificate is one over orbits, which is for sums of one objective")
         if symmetries is not None:
             certified = certified_orbit_bound(
                 points,
                 data.certificate,
-                costs,
+                goal.costs,
                 invariant=lambda: is_invariant(data.objective, data.costs, symmetries),
                 sense=data.sense,
                 spanning=data.spanning,
                 max_table=MAX_TABLE if self.max_subsets is None else self.max_subsets,
             )
         else:
-            certified = certified_bound(
-                points,
-                data.certificate,
-                costs,
-                sense=data.sense,
-                spanning=data.spanning,
-                max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+            certified = certify(goal, data.certificate, self._certifier(points), earlier=earlier)
+        if certified.bound is not None and goal.is_bottleneck:
+            self.checks.append(
+                f"the multipliers prove that each triangulation has a simplex that is no better than "
+                f"{shown(certified.bound)}, among {certified.candidates:,} candidate simplices"
             )
-        if certified.bound is not None:
+        elif certified.bound is not None:
             if symmetries:
                 self.checks.append(f"{len(symmetries)} permutations of the points are affine symmetries")
-            self.checks.append(
-                f"the multipliers prove the bound {shown(certified.bound)} "
-                f"over {certified.candidates:,} candidate simplices"
-            )
+            if certified.refuted is None:
+                proof = f"the multipliers prove the bound {shown(certified.bound)}"
+            else:
+                proof = f"multipliers of rows and cuts prove that no triangulation reaches {shown(certified.refuted)},"
+            self.checks.append(f"{proof} over {certified.candidates:,} candidate simplices")
         return certified
 
+    def _certifier(self, points: ExactPoints) -> Certifier:
+        def certifier(certificate: CertificateData, costs: Costs, sense: str) -> CertifiedBound:
+            return certified_bound(
+                points,
+                certificate,
+                costs,
+                sense=sense,
+                spanning=self.data.spanning,
+                restrictions=self.data.restrictions,
+                max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+            )
+
+        return certifier
+
     def _statement(
-        self, value: Fraction | None, best: Fraction | None, certified: CertifiedBound | None
+        self,
+        data: ResultData,
+        value: Fraction | None,
+        best: Fraction | None,
+        certified: CertifiedBound | None,
     ) -> str:
-        data = self.data
+        noun = "dissection" if data.dissection else "triangulation"
+        if data.status == "infeasible":
+            return "infeasible according to the solver: its proof is not in this file"
         if value is None:
-            parts = [f"there is no triangulation in this result (status '{data.status}')"]
+            parts = [f"there is no {noun} in this result (status '{data.status}')"]
         elif best is not None and not is_better(best, value, data.sense):
             return (
-                "optimal, proven exactly: the triangulation is verified, "
+                f"optimal, proven exactly: the {noun} is verified, "
                 f"and its value {shown(value)} meets the bound {shown(best)}"
             )
         else:
-            parts = [f"triangulation verified, value {shown(value)}"]
-        parts.append(self._bound_statement(best, certified))
+            parts = [f"{noun} verified, value {shown(value)}"]
+        parts.append(self._bound_statement(data, best, certified))
         if value is None or data.status != "optimal":
             if value is not None:
                 parts.append(f"not claimed to be optimal (status '{data.status}')")
@@ -219,10 +402,12 @@ class _Verifier:
             parts.append("optimality rests on the solver's tree")
         return "; ".join(parts)
 
-    def _bound_statement(self, best: Fraction | None, certified: CertifiedBound | None) -> str:
+    def _bound_statement(
+        self, data: ResultData, best: Fraction | None, certified: CertifiedBound | None
+    ) -> str:
         if best is not None:
             return f"bound {shown(best)} proven exactly"
         if certified is not None:
             return f"the bound of its certificate was not re-checked: {certified.obstacle}"
-        reason = self.data.certificate.reason if self.data.certificate is not None else ""
+        reason = data.certificate.reason if data.certificate is not None else ""
         return "no exact bound in this file" + (f" ({reason})" if reason else "")

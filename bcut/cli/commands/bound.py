@@ -12,6 +12,7 @@ from bcut.cli.options import (
     report_options,
     run_options,
     separator_options,
+    symmetry_options,
 )
 from bcut.cli.running import carry_out
 
@@ -28,6 +29,7 @@ from bcut.cli.running import carry_out
     help="listing: all simplices. orbits: orbits of simplices under the symmetries (cardinality only; of the "
     "separators only link is at work). auto: orbits for large symmetric configurations, else listing.",
 )
+@symmetry_options
 @run_options
 @report_options
 def bound(**options: Any) -> int:

@@ -12,6 +12,7 @@ from bcut.cli.options import (
     report_options,
     run_options,
     separator_options,
+    symmetry_options,
 )
 from bcut.cli.running import carry_out
 
@@ -19,6 +20,13 @@ from bcut.cli.running import carry_out
 @click.command(short_help="Find an optimal triangulation.")
 @instance_argument
 @objective_options
+@click.option(
+    "--then",
+    multiple=True,
+    metavar="[min:|max:]OBJECTIVE",
+    help="A further objective, repeatable: it decides among the best by those before it, as in "
+    "--objective max-min:dihedral-angle --then cardinality.",
+)
 @separator_options
 @click.option(
     "--method",
@@ -28,6 +36,13 @@ from bcut.cli.running import carry_out
     help="listing: list all simplices, bound and fix at the root, then branch on what is left. orbits: the same with "
     "orbits of simplices under the symmetries (cardinality only). scip: leave everything to SCIP. auto: orbits for "
     "large symmetric configurations, else listing.",
+)
+@symmetry_options
+@click.option(
+    "--invariant-under",
+    metavar="ORDER|FILE",
+    help="Only triangulations that are invariant under some symmetries: those that the permutations in a file "
+    "generate, or some subgroup of this order.",
 )
 @run_options
 @report_options

@@ -31,6 +31,16 @@ def verify(result: Path, as_json: bool, quiet: bool) -> int:
                 "exact_bound": _text(found.exact_bound),
                 "rounded_bound": _text(found.rounded_bound),
                 "proven_optimal": found.proven_optimal,
+                "then": [
+                    {
+                        "statement": level.statement,
+                        "value": _text(level.value),
+                        "exact_bound": _text(level.exact_bound),
+                        "rounded_bound": _text(level.rounded_bound),
+                        "proven_optimal": level.proven_optimal,
+                    }
+                    for level in found.further
+                ],
                 "checks": found.checks,
             }
         )

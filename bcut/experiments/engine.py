@@ -1,0 +1,149 @@
+"""Running a plan: what is stored is skipped, what ends is stored at once, and what fails fails alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bcut.experiments.plan import Plan, read_plan
+from bcut.experiments.pools import make_pool
+from bcut.experiments.process import Outcome
+from bcut.experiments.store import Store, default_workers
+from bcut.experiments.tasks import SCHEMA, Task, code_version, machine, tasks_of
+
+Watcher = Callable[["Progress"], None]
+
+
+@dataclass
+class Progress:
+    """How far an experiment is.
+
+    Attributes
+    ----------
+    total : int
+        Different runs that the plan asks for.
+    stored : int
+        Those that were stored before.
+    done : int
+        Those that ended well since.
+    failures : list of (str, str, str)
+        Instance, variant and message of those that failed.
+    interrupted : bool
+    last : str
+        What ended last.
+    """
+
+    total: int = 0
+    stored: int = 0
+    done: int = 0
+    failures: list[tuple[str, str, str]] = field(default_factory=list)
+    interrupted: bool = False
+    last: str = ""
+
+
+def run_experiment(
+    plan: Plan | Path | str,
+    folder: Path | str,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    on_progress: Watcher | None = None,
+) -> Progress:
+    """Carry out the runs of a plan that are not stored yet.
+
+    Parameters
+    ----------
+    plan : Plan or path
+    folder : path
+        Made where it does not exist.
+    scheduler : str, optional
+        Address of a dask scheduler.
+    workers : int, optional
+        Runs at once on this machine; as many as it has cores when omitted.
+    on_progress : callable, optional
+        Told whenever a run ends.
+
+    Returns
+    -------
+    Progress
+        Ctrl-C ends it early, with everything stored that had ended.
+
+    Raises
+    ------
+    InputError
+        Bad plan or folder.
+    """
+    plan = plan if isinstance(plan, Plan) else read_plan(plan)
+    store, progress = Store(Path(folder)), Progress()
+    tasks = list(tasks_of(plan))
+    store.prepare()
+    with store.locked():
+        store.save_manifest(manifest_of(plan, tasks))
+        distinct = {task.fingerprint: task for task in tasks}
+        store.forget_errors(distinct)
+        open_tasks = {name: task for name, task in distinct.items() if not store.has(name)}
+        progress.total, progress.stored = len(distinct), len(distinct) - len(open_tasks)
+        _tell(progress, on_progress)
+        if open_tasks:
+            try:
+                with make_pool(scheduler, workers or default_workers()) as pool:
+                    for name, outcome in pool.carry_out([(n, t.data) for n, t in open_tasks.items()]):
+                        _store(store, open_tasks[name], outcome, progress)
+                        _tell(progress, on_progress)
+            except KeyboardInterrupt:
+                progress.interrupted = True
+    return progress
+
+
+def _tell(progress: Progress, on_progress: Watcher | None) -> None:
+    if on_progress is not None:
+        on_progress(progress)
+
+
+def _store(store: Store, task: Task, outcome: Outcome, progress: Progress) -> None:
+    progress.last = f"{task.case.instance}, {task.variant.name}"
+    if outcome.record is not None:
+        store.save(task.fingerprint, outcome.record, outcome.ledger)
+        progress.done += 1
+    elif outcome.error is not None:
+        about = {
+            "instance": task.case.instance,
+            "variant": task.variant.name,
+            "settings": task.data["settings"],
+        }
+        store.save_error(task.fingerprint, about, outcome.error)
+        progress.failures.append((task.case.instance, task.variant.name, outcome.error["message"]))
+
+
+def manifest_of(plan: Plan, tasks: list[Task]) -> dict[str, Any]:
+    """Return what a report needs to know of the plan, in the plan's order."""
+    return {
+        "schema": SCHEMA,
+        "name": plan.name,
+        "description": plan.description,
+        "protocol": plan.protocol,
+        "plan": plan.text,
+        "written": time.time(),
+        "code": code_version(),
+        "machine": machine(),
+        "variants": [
+            {"name": v.name, "role": v.role, "family": v.family, **v.settings()} for v in plan.variants
+        ],
+        "runs": [
+            {
+                "fingerprint": task.fingerprint,
+                "instance": task.case.instance,
+                "class": task.case.label,
+                "objective": task.case.objective,
+                "sense": task.case.sense,
+                "spanning": task.case.spanning,
+                "formulation": task.case.formulation,
+                "optimum": None if task.case.optimum is None else str(task.case.optimum),
+                "variant": task.variant.name,
+            }
+            for task in tasks
+        ],
+    }

@@ -1,0 +1,359 @@
+"""Carrying out one run, in a process of its own.
+
+``python -m bcut.experiments.execute FOLDER`` reads the task from standard input, and writes the record and the
+ledger, or the error, into the folder. The process ends when its standard input does: with the process that
+started it, however that one ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Mapping
+from dataclasses import asdict
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from bcut.errors import BcutError, InputError
+from bcut.experiments.ledger import LedgerWriter
+from bcut.experiments.recording import Recorder
+from bcut.experiments.tasks import code_version, digest_of, machine
+from bcut.experiments.variants import named
+
+RECORD, LEDGER, ERROR = "record.json", "ledger.gz", "error.json"
+
+
+def carry_out(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes | None]:
+    """Carry out a run.
+
+    Parameters
+    ----------
+    task : mapping
+        `bcut.experiments.tasks.Task.data`.
+
+    Returns
+    -------
+    record : dict
+        What was asked, and what came out.
+    ledger : bytes or None
+        The file of its cuts.
+
+    Raises
+    ------
+    BcutError
+        Bad input, a separator or a solver that failed, or other code or files than the task was made for.
+    """
+    _check_version(task)
+    started = time.time()
+    run = _Run(task)
+    outcome = {"loop": run.loop, "root": run.root, "solve": run.solve, "plain": run.plain}[
+        task["settings"]["preset"]
+    ]()
+    counts = {} if run.recorder is None else {name: asdict(c) for name, c in run.recorder.counts.items()}
+    instance = {key: task["instance"][key] for key in ("name", "dimension", "digest")}
+    record = {
+        "schema": task["schema"],
+        "instance": {**instance, "points": len(task["instance"]["points"])},
+        "problem": task["problem"],
+        "settings": task["settings"],
+        "outcome": outcome,
+        "cuts": counts,
+        "code": task["code"],
+        "machine": machine(),
+        "started": started,
+    }
+    return record, run.ledger
+
+
+def _check_version(task: Mapping[str, Any]) -> None:
+    """Refuse to run with other sources or files than those that the fingerprint speaks of."""
+    here = code_version()
+    if here != task["code"]:
+        differing = ", ".join(key for key in here if here[key] != task["code"].get(key))
+        raise InputError(
+            f"the run was planned with another version ({differing}) than it would be run with; "
+            "install the same version everywhere, and start the experiment again after changing the code"
+        )
+    for path, digest in task["files"].items():
+        if digest_of(Path(path)) != digest:
+            raise InputError(
+                f"{path}: has changed since the experiment was started, or differs on this machine"
+            )
+
+
+class _Run:
+    """One run: the problem, and the ways to work on it."""
+
+    def __init__(self, task: Mapping[str, Any]) -> None:
+        from bcut.geometry.configuration import PointConfiguration
+
+        self.task, self.problem, self.settings = task, task["problem"], task["settings"]
+        self.configuration = PointConfiguration.from_values(
+            task["instance"]["points"], name=task["instance"]["name"]
+        )
+        self.started = time.perf_counter()
+        self.recorder: Recorder | None = None
+        self.ledger: bytes | None = None
+
+    def loop(self) -> dict[str, Any]:
+        """Run the cutting-plane loop in HiGHS."""
+        from bcut.bounds.root import RootLimits, root_bound
+
+        if self.settings["method"] == "orbits":
+            return self._by_orbits()
+        formulation, objective = self._program()
+        self._record(formulation)
+        separation = self._separation(formulation)
+        target = None
+        if self.problem["cutoff"] is not None:
+            target = objective.sign * Fraction(self.problem["cutoff"])
+        limits = RootLimits(deadline=self._deadline(), target=target)
+        found = root_bound(formulation, objective, separation, limits=limits)
+        if self.recorder is not None:
+            self.ledger = self.recorder.finish_loop(found)
+        own = self._families(separation)
+        spent = sum(finished.seconds for finished in found.rounds)
+        return {
+            "status": found.status,
+            "lp": found.lp,
+            "lp_after_cuts": found.lp_after_cuts,
+            "integral": found.status == "integral",
+            "value": None,
+            "bound": found.lp_after_cuts,
+            "nodes": 0,
+            "rounds": [[finished.lp, finished.cuts] for finished in found.rounds],
+            "columns": len(formulation.simplices),
+            "columns_after_fixing": len(found.columns),
+            "separators": own,
+            "seconds": self._seconds(
+                lp=spent - self._recording - sum(entry["seconds"] for entry in own.values()), own=own
+            ),
+        }
+
+    def root(self) -> dict[str, Any]:
+        """Run SCIP's root node under clean conditions."""
+        from bcut.scip.host import TreeOptions, branch_and_cut
+
+        formulation, objective = self._program()
+        self._record(formulation)
+        separation = self._separation(formulation)
+        limited, unlimited = named(tuple(self.settings["scip"]))
+        options = TreeOptions(
+            seconds=self.settings["time_limit"],
+            nodes=1,
+            seed=self.settings["seed"],
+            cutoff=self._cutoff(objective),
+            scip_separators="default" in self.settings["scip"],
+            named=limited,
+            unlimited=unlimited,
+            presolve=False,
+            heuristics=False,
+            statistics=True,
+        )
+        watch = None if self.recorder is None else self.recorder.root_lp
+        tree = branch_and_cut(formulation, objective, separation, options=options, on_root_lp=watch)
+        if self.recorder is not None:
+            self.ledger = self.recorder.finish_scip()
+        lps = [finished.lp for finished in tree.rounds]
+        return {
+            # SCIP proves optimality from rounded bounds; the last relaxation's point need not be integral.
+            "lp": lps[0] if lps else None,
+            "lp_after_cuts": lps[-1] if lps else None,
+            "integral": tree.status == "optimal",
+            **self._of_tree(tree, objective, len(formulation.simplices), self._families(separation)),
+        }
+
+    def plain(self) -> dict[str, Any]:
+        """Leave the exported model to SCIP and its defaults."""
+        from bcut.scip.host import TreeOptions, branch_and_cut
+
+        formulation, objective = self._program()
+        options = TreeOptions(
+            seconds=self.settings["time_limit"], seed=self.settings["seed"], plain=True, statistics=True
+        )
+        tree = branch_and_cut(formulation, objective, None, options=options)
+        lps = [finished.lp for finished in tree.rounds]
+        return {
+            "lp": lps[0] if lps else None,
+            "lp_after_cuts": lps[-1] if lps else None,
+            "integral": None,
+            **self._of_tree(tree, objective, len(formulation.simplices), {}),
+        }
+
+    def solve(self) -> dict[str, Any]:
+        """Solve as ``bcut solve`` does."""
+        from bcut.solving.api import solve
+
+        self._record(None)
+        result = solve(
+            self.configuration,
+            objective=self.problem["objective"],
+            sense=self.problem["sense"],
+            formulation=self.problem["formulation"],
+            spanning=self.problem["spanning"],
+            separators=self.settings["separators"],
+            time_limit=self.settings["time_limit"],
+            seed=self.settings["seed"],
+            method=self.settings["method"],
+            cut_observer=self.recorder,
+        )
+        if self.recorder is not None:
+            self.ledger = self.recorder.finish()
+        return self._of_result(result)
+
+    def _by_orbits(self) -> dict[str, Any]:
+        from bcut.solving.api import bound
+
+        result = bound(
+            self.configuration,
+            objective=self.problem["objective"],
+            sense=self.problem["sense"],
+            spanning=self.problem["spanning"],
+            separators=self.settings["separators"],
+            time_limit=self.settings["time_limit"],
+            method="orbits",
+        )
+        return self._of_result(result)
+
+    # What several of them share.
+
+    def _program(self) -> tuple[Any, Any]:
+        from bcut.objectives.objective import Bottleneck, make_objective
+        from bcut.solving.programs import formulation_name, make_formulation
+
+        name = formulation_name(self.problem["formulation"], dissection=False)
+        formulation = make_formulation(name, self.configuration, spanning=self.problem["spanning"])
+        objective = make_objective(self.problem["objective"], formulation, sense=self.problem["sense"])
+        if isinstance(objective, Bottleneck):
+            raise InputError(
+                f"objective '{self.problem['objective']}' has no root relaxation of its own: it is settled by a row of "
+                "them; take preset 'solve'"
+            )
+        return formulation, objective
+
+    def _record(self, formulation: Any) -> None:
+        # In other formulations cuts may speak of more than d-simplices.
+        if self.settings["ledger"] and self.problem["formulation"] == "2":
+            header = {"instance": self.task["instance"], "problem": self.problem, "settings": self.settings}
+            self.recorder = Recorder(LedgerWriter(header), formulation)
+
+    def _separation(self, formulation: Any) -> Any:
+        from bcut.separation.driver import Separation
+        from bcut.separation.resolve import resolve
+        from bcut.separation.seam import Problem
+
+        separators = [resolve(text) for text in self.settings["separators"]]
+        # Without separators too: the observer hears of relaxations through it.
+        return Separation(separators, Problem(formulation), observer=self.recorder)
+
+    def _families(self, separation: Any) -> dict[str, Any]:
+        return {name: asdict(family) for name, family in separation.statistics.items()}
+
+    def _deadline(self) -> float | None:
+        limit = self.settings["time_limit"]
+        return None if limit is None else time.monotonic() + limit
+
+    def _cutoff(self, objective: Any) -> float | None:
+        """Return a cutoff that optimal solutions stay below, and no worse ones where values are multiples of a unit."""
+        if self.problem["cutoff"] is None:
+            return None
+        optimum = Fraction(self.problem["cutoff"])
+        room = objective.unit / 2 if objective.counts_units else max(Fraction(1), abs(optimum)) / 10**6
+        return float(optimum + objective.sign * room)
+
+    @property
+    def _recording(self) -> float:
+        """Seconds that recording took, which are no part of the time of the run."""
+        return 0.0 if self.recorder is None else self.recorder.seconds
+
+    def _seconds(self, *, lp: float, own: Mapping[str, Any], aside: float = 0.0) -> dict[str, float]:
+        return {
+            "total": time.perf_counter() - self.started - self._recording - aside,
+            "lp": max(0.0, lp),
+            "separation": sum(entry["seconds"] for entry in own.values()),
+        }
+
+    def _of_tree(self, tree: Any, objective: Any, columns: int, own: dict[str, Any]) -> dict[str, Any]:
+        assert tree.solver is not None
+        theirs = {f"scip:{name}": asdict(entry) for name, entry in tree.solver.separators.items()}
+        return {
+            "status": tree.status,
+            "value": None if tree.columns is None else float(objective.value(tree.columns)),
+            "bound": tree.bound,
+            "nodes": tree.nodes,
+            "rounds": [[finished.lp, finished.cuts] for finished in tree.rounds],
+            "columns": columns,
+            "columns_after_fixing": None,
+            "separators": {**own, **theirs},
+            "seconds": self._seconds(lp=tree.solver.lp_seconds, own={**own, **theirs}, aside=tree.watching),
+        }
+
+    def _of_result(self, result: Any) -> dict[str, Any]:
+        own = result.separators
+        in_root = result.seconds.get("root", 0.0)
+        return {
+            "status": result.status,
+            "lp": result.root.lp,
+            "lp_after_cuts": result.root.lp_after_cuts,
+            "integral": result.root.integral,
+            "value": result.value,
+            "bound": result.bound,
+            "nodes": result.nodes,
+            "rounds": [[entry.lp, entry.cuts] for entry in result.root.rounds],
+            "columns": result.size.columns,
+            "columns_after_fixing": result.size.columns_after_fixing,
+            "separators": own,
+            "seconds": self._seconds(lp=in_root - sum(entry["seconds"] for entry in own.values()), own=own),
+            "stages": result.seconds,
+        }
+
+
+def main(folder: Path) -> int:
+    """Read a task from standard input, and write what comes of it; returns the exit status."""
+    task = json.loads(sys.stdin.readline())
+    _end_with_standard_input()
+    _limit_memory(task["settings"]["memory_limit"])
+    try:
+        record, ledger = carry_out(task)
+        if ledger is not None:
+            (folder / LEDGER).write_bytes(ledger)
+        (folder / RECORD).write_text(json.dumps(record, allow_nan=False), encoding="utf-8")
+    except Exception as error:
+        trace = getattr(error, "trace", "") if isinstance(error, BcutError) else traceback.format_exc()
+        message = str(error) or type(error).__name__
+        found = {"kind": type(error).__name__, "message": message, "trace": trace}
+        (folder / ERROR).write_text(json.dumps(found), encoding="utf-8")
+        return 1
+    return 0
+
+
+def _end_with_standard_input() -> None:
+    """End this process when nobody is left who could want its result."""
+
+    def wait() -> None:
+        # Not through sys.stdin, whose lock a thread must not hold when the interpreter ends.
+        while os.read(0, 4096):
+            pass
+        os._exit(3)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def _limit_memory(gibibytes: float | None) -> None:
+    if gibibytes is None:
+        return
+    try:
+        import resource
+    except ImportError:  # not on this system
+        return
+    size = int(gibibytes * 2**30)
+    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

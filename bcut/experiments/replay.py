@@ -1,0 +1,200 @@
+"""Solving a root relaxation again with exactly the cuts of a ledger, and proving its cuts again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.errors import LedgerError, VerificationError
+from bcut.experiments.ledger import Ledger
+from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut
+from bcut.verification.exact_points import ExactPoints
+
+# Relative to the larger of the bound and 1.
+REPLAY_TOLERANCE = 1e-9
+_MOST_REASONS = 10
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A root relaxation that was solved again.
+
+    Attributes
+    ----------
+    recorded, found : float
+        Its value in the ledger and now.
+    before : float
+        Without cuts.
+    cuts : int
+    """
+
+    recorded: float
+    found: float
+    before: float
+    cuts: int
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the two values are the same up to 1e-9."""
+        return abs(self.recorded - self.found) <= REPLAY_TOLERANCE * max(1.0, abs(self.recorded))
+
+
+def replay(ledger: Ledger) -> Replay:
+    """Solve the relaxation with the cuts that a run ended with.
+
+    Raises
+    ------
+    LedgerError
+        The ledger is not about one root relaxation.
+    """
+    from bcut.bounds.relaxation import Relaxation
+    from bcut.objectives.objective import make_objective
+    from bcut.separation.driver import IntegerCut
+    from bcut.solving.programs import formulation_name, make_formulation
+
+    end, problem = ledger.end, ledger.header["problem"]
+    if end["lp"] is None:
+        raise LedgerError(
+            "this ledger records no last relaxation of a root; take one of a variant with preset 'loop' or 'root'"
+        )
+    configuration = _configuration(ledger.header["instance"])
+    name = formulation_name(problem["formulation"], dissection=False)
+    formulation = make_formulation(name, configuration, spanning=problem["spanning"])
+    objective = make_objective(problem["objective"], formulation, sense=problem["sense"])
+    relaxation = Relaxation(formulation, objective)
+    plain = relaxation.solve()
+    place = {tuple(simplex): column for column, simplex in enumerate(formulation.simplices.tolist())}
+
+    def columns(simplices: list[list[int]]) -> NDArray[np.int64]:
+        try:
+            return np.array([place[tuple(simplex)] for simplex in simplices], dtype=np.int64)
+        except KeyError as error:
+            raise LedgerError(f"the ledger speaks of {error}, which is no candidate simplex") from None
+
+    rows = [
+        IntegerCut(cut["family"], columns(cut["simplices"]), np.array(cut["coefficients"]), cut["rhs"], {})
+        for cut in ledger.cuts
+        if cut["final"]
+    ]
+    # A column that SCIP fixed at 1 is one more row.
+    rows += [IntegerCut("fixed", columns([simplex]), np.array([-1]), -1, {}) for simplex in end["at_one"]]
+    relaxation.add(rows)
+    fixed = columns(end["at_zero"])
+    if len(fixed):
+        relaxation = relaxation.restricted_to(np.setdiff1d(np.arange(len(formulation.simplices)), fixed))
+    point = relaxation.solve()
+    assert plain is not None
+    assert point is not None
+    return Replay(float(end["lp"]), point.value, plain.value, len(rows) - len(end["at_one"]))
+
+
+def _configuration(instance: Mapping[str, Any]) -> Any:
+    from bcut.geometry.configuration import PointConfiguration
+
+    configuration = PointConfiguration.from_values(instance["points"], name=instance["name"])
+    if configuration.digest != instance["digest"]:
+        raise LedgerError("the points of the ledger do not have the digest that stands beside them")
+    return configuration
+
+
+@dataclass
+class CutChecks:
+    """What became of proving the cuts of a ledger again.
+
+    Attributes
+    ----------
+    proven : dict of str to int
+        Cuts whose right-hand side follows from their proof, by family.
+    without_checker : dict of str to int
+        Cuts of families that nobody can check, such as SCIP's own.
+    refused : list of (int, str)
+        Number and reason of those that do not hold.
+    """
+
+    proven: dict[str, int] = field(default_factory=dict)
+    without_checker: dict[str, int] = field(default_factory=dict)
+    refused: list[tuple[int, str]] = field(default_factory=list)
+
+
+def check_ledger(ledger: Ledger) -> CutChecks:
+    """Derive the right-hand side of every cut again, exactly, from its proof and the points alone.
+
+    A cut found when columns had been fixed is about the simplices that were left; those are its candidates.
+
+    Returns
+    -------
+    CutChecks
+        With all refusals. A right-hand side is refused as well where a smaller one follows: it is not the one that the
+        proof gives.
+
+    Raises
+    ------
+    LedgerError
+        A cut is malformed.
+    """
+    problem = ledger.header["problem"]
+    points = ExactPoints(_configuration(ledger.header["instance"]).scalars())
+    whole = Candidates(points, spanning=problem["spanning"])
+    tables: dict[int, Candidates] = {}
+    checks = CutChecks()
+    for entry in ledger.cuts:
+        family, number = entry["family"], entry["number"]
+        if family not in CUT_CHECKERS:
+            checks.without_checker[family] = checks.without_checker.get(family, 0) + 1
+            continue
+        cut = _certificate_cut(entry, points)
+        part = entry["part"]
+        if part not in tables:
+            tables[part] = whole
+            if part in ledger.parts:
+                tables[part] = whole.only(tuple(simplex) for simplex in ledger.parts[part])
+        try:
+            rhs = CUT_CHECKERS[family](tables[part], cut)
+            if rhs != cut.rhs:
+                raise VerificationError(
+                    f"{family} cut: its right-hand side is {cut.rhs}, but its proof gives {rhs}"
+                )
+        except VerificationError as error:
+            checks.refused.append((number, str(error)))
+        else:
+            checks.proven[family] = checks.proven.get(family, 0) + 1
+    return checks
+
+
+def _certificate_cut(entry: Mapping[str, Any], points: ExactPoints) -> CertificateCut:
+    simplices, coefficients = entry["simplices"], entry["coefficients"]
+    good = (
+        isinstance(simplices, list)
+        and isinstance(coefficients, list)
+        and len(simplices) == len(coefficients) > 0
+        and all(_is_simplex(simplex, points) for simplex in simplices)
+        and all(type(value) is int for value in (*coefficients, entry["rhs"]))
+        and isinstance(entry["proof"], dict)
+    )
+    if not good or len({tuple(simplex) for simplex in simplices}) != len(simplices):
+        raise LedgerError(
+            f"cut {entry['number']} is malformed: it needs different simplices, an integer for each, "
+            "and a right-hand side"
+        )
+    return CertificateCut(
+        entry["family"],
+        tuple(tuple(simplex) for simplex in simplices),
+        tuple(Fraction(value) for value in coefficients),
+        Fraction(entry["rhs"]),
+        Fraction(0),
+        entry["proof"],
+    )
+
+
+def _is_simplex(value: Any, points: ExactPoints) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == points.dimension + 1
+        and all(type(vertex) is int and 0 <= vertex < points.n for vertex in value)
+        and sorted(set(value)) == value
+    )

@@ -1,0 +1,1 @@
+"""Reports: from stored runs to tables, figures and one page."""

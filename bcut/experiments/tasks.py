@@ -1,0 +1,165 @@
+"""Runs as plain data, each with the fingerprint of everything that it depends on."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.metadata
+import json
+import os
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bcut
+from bcut.errors import InputError
+from bcut.experiments.cases import Case, load_case, objective_file
+from bcut.experiments.plan import Plan
+from bcut.experiments.variants import Variant
+from bcut.separation.resolve import Specification
+
+SCHEMA = 1
+
+# Parts of the package that no result depends on; of the experiments, these do the work of a run.
+_ASIDE = ("cli", "plotting", "experiments")
+_AT_WORK = ("execute.py", "recording.py", "ledger.py")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One run: plain data that another process, or another machine, can carry out.
+
+    Attributes
+    ----------
+    fingerprint : str
+        SHA-256 of the inputs and of the code.
+    data : dict
+        What `bcut.experiments.execute` reads.
+    case : Case
+    variant : Variant
+    """
+
+    fingerprint: str
+    data: dict[str, Any]
+    case: Case
+    variant: Variant
+
+
+def tasks_of(plan: Plan) -> Iterator[Task]:
+    """Yield the runs of a plan, problem by problem; two variants that ask for the same have the same fingerprint."""
+    code = code_version()
+    for case in plan.cases:
+        configuration = load_case(case)
+        instance = {
+            "name": configuration.name,
+            "dimension": configuration.dimension,
+            "points": [list(point) for point in configuration.exact_points()],
+            "digest": configuration.digest,
+        }
+        for variant in plan.variants:
+            yield _task(case, variant, instance, code)
+
+
+def _task(case: Case, variant: Variant, instance: dict[str, Any], code: dict[str, str]) -> Task:
+    settings = variant.settings()
+    if variant.cutoff and case.optimum is None:
+        raise InputError(
+            f"variant '{variant.name}' asks for the optimum as a cutoff, but that of {case.instance} is not known; "
+            "give it as 'optimum', or take cutoff away"
+        )
+    problem = {
+        "objective": case.objective,
+        "sense": case.sense,
+        "spanning": case.spanning,
+        "formulation": case.formulation,
+        "cutoff": str(case.optimum) if variant.cutoff else None,
+    }
+    data = {
+        "schema": SCHEMA,
+        "instance": instance,
+        "problem": problem,
+        "settings": settings,
+        "files": _files(case, variant),
+        "code": code,
+    }
+    identity = {**data, "instance": instance["digest"]}
+    text = json.dumps(identity, sort_keys=True, separators=(",", ":"))
+    return Task(hashlib.sha256(text.encode()).hexdigest(), data, case, variant)
+
+
+def _files(case: Case, variant: Variant) -> dict[str, str]:
+    """Return the digests of files that a run reads: separators and costs."""
+    specifications = [Specification.parse(text) for text in variant.separators]
+    paths = [specification.source for specification in specifications if specification.is_file]
+    costs = objective_file(case.objective)
+    if costs is not None:
+        paths.append(costs)
+    return {path: digest_of(Path(path)) for path in paths}
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def code_version() -> dict[str, str]:
+    """Return what a result depends on besides its inputs: this package's sources, and the solvers'."""
+    from bcut.scip.host import scip_version
+
+    return {
+        "bcut": bcut.__version__,
+        "sources": sources_digest(),
+        "scip": scip_version(),
+        "pyscipopt": importlib.metadata.version("pyscipopt"),
+        "highs": importlib.metadata.version("highspy"),
+        "numpy": importlib.metadata.version("numpy"),
+    }
+
+
+def sources_digest() -> str:
+    """Return the SHA-256 of all sources that a run executes, the separators included."""
+    folder = Path(os.path.dirname(bcut.__file__))
+    files = {
+        path.relative_to(folder).as_posix(): path
+        for path in folder.rglob("*.py")
+        if path.relative_to(folder).parts[0] not in _ASIDE
+    }
+    files |= {f"experiments/{name}": folder / "experiments" / name for name in _AT_WORK}
+    separators = importlib.import_module("bcut.separators")
+    for place in separators.__path__:
+        files |= {f"separators/{path.name}": path for path in Path(place).glob("*.py")}
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0".encode() + hashlib.sha256(files[name].read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def machine() -> dict[str, Any]:
+    """Describe the machine, without its name."""
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+    }
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown"

@@ -1,0 +1,141 @@
+"""A user's objective: one function of the coordinates of simplices, in a file of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.errors import ObjectiveError, ObjectiveLoadError
+from bcut.geometry.configuration import PointConfiguration
+from bcut.objectives.registry import Costs, Ratios, Simplices
+from bcut.objectives.syntax import MeasureName
+
+# Integer costs up to this size stay in 64 bits.
+_MAX_INTEGER = 1 << 40
+
+
+def costs_of_function(text: str, configuration: PointConfiguration, simplices: Simplices) -> Costs:
+    """Call the function that a user wrote as ``FILE.py`` or ``FILE.py:FUNCTION`` with all simplices at once.
+
+    Parameters
+    ----------
+    text : str
+    configuration : PointConfiguration
+    simplices : ndarray of int, shape (m, d + 1)
+
+    Returns
+    -------
+    ndarray of int64 or float, or Ratios
+        As the function returned it: integers stay integers, and doubles are taken exactly.
+
+    Raises
+    ------
+    ObjectiveLoadError
+        There is no such file or function.
+    ObjectiveError
+        It raised, or returned something else than a finite number for each simplex.
+    """
+    function = load_function(text)
+    # Fancy indexing makes a fresh array, which the function may do with as it likes.
+    coordinates = configuration.floats[simplices]
+    name = getattr(function, "__name__", "function")
+    result = _guarded(text, f"{name}()", lambda: np.asarray(function(coordinates)))
+    return _checked(text, name, result, simplices)
+
+
+def load_function(text: str) -> Callable[[NDArray[np.float64]], Any]:
+    """Import the file of an objective and return its function.
+
+    Raises
+    ------
+    ObjectiveLoadError
+        There is no such file, or no such function in it, or several and none is named.
+    ObjectiveError
+        The file raises when it is imported.
+    """
+    name = MeasureName.parse(text)
+    path = Path(name.source)
+    if not path.is_file():
+        raise ObjectiveLoadError(f"objective file {path}: there is no such file")
+    if path.suffix != ".py":
+        raise ObjectiveLoadError(f"objective file {path}: not a Python file; its name must end in .py")
+    module_name = f"bcut_user_objective_{abs(hash(path.resolve()))}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise ObjectiveLoadError(f"objective file {path}: Python cannot import it")
+    module = importlib.util.module_from_spec(spec)
+    loader = spec.loader
+    sys.modules[module_name] = module  # dataclasses and pickling look their module up
+    _guarded(str(path), "loading it", lambda: loader.exec_module(module))
+    return _function_of(module, path, name.argument)
+
+
+def _function_of(module: ModuleType, path: Path, wanted: str) -> Callable[[NDArray[np.float64]], Any]:
+    own = {
+        name: value
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
+    }
+    if wanted:
+        found = getattr(module, wanted, None)
+        if not callable(found):
+            known = f"; it has {', '.join(own)}" if own else ""
+            raise ObjectiveLoadError(f"objective file {path}: it has no function '{wanted}'{known}")
+        return found
+    if len(own) == 1:
+        return next(iter(own.values()))
+    if not own:
+        raise ObjectiveLoadError(
+            f"objective file {path}: it defines no function; write one that takes the coordinates of m simplices, an "
+            "array of shape (m, d + 1, d), and returns m costs"
+        )
+    raise ObjectiveLoadError(
+        f"objective file {path}: it defines {', '.join(own)}; say which by {path}:FUNCTION, "
+        "or begin the names of the others with an underscore"
+    )
+
+
+def _checked(text: str, name: str, result: NDArray[Any], simplices: Simplices) -> Costs:
+    if result.shape != (len(simplices),):
+        raise ObjectiveError(
+            text,
+            f"{name}() returned an array of shape {result.shape} for {len(simplices)} simplices; "
+            f"expected ({len(simplices)},), one cost for each",
+        )
+    if result.dtype.kind in "biu":
+        integers = result.astype(object)
+        if all(abs(int(value)) <= _MAX_INTEGER for value in integers):
+            return result.astype(np.int64)
+        return Ratios(np.array([int(value) for value in integers], dtype=object), 1)
+    if result.dtype.kind != "f":
+        raise ObjectiveError(
+            text, f"{name}() returned entries of type {result.dtype}; a cost is a real number"
+        )
+    with np.errstate(over="ignore"):
+        costs = result.astype(np.float64)
+    wrong = np.flatnonzero(~np.isfinite(costs))
+    if len(wrong):
+        first = int(wrong[0])
+        raise ObjectiveError(
+            text,
+            f"{name}() returned {costs[first]} for simplex {simplices[first].tolist()}; a cost is a finite number",
+        )
+    return costs
+
+
+def _guarded(source: str, what: str, action: Callable[[], Any]) -> Any:
+    """Run a user's own code; what it raises becomes an `ObjectiveError` with its traceback."""
+    try:
+        return action()
+    except (Exception, SystemExit) as error:  # a script that is no objective may well call sys.exit()
+        trace = "".join(traceback.format_exception(error))
+        raise ObjectiveError(source, f"{what} raised {type(error).__name__}: {error}", trace) from error

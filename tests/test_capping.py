@@ -1,0 +1,104 @@
+"""Sums of costs of very different sizes: what is too dear for an optimum does not spoil the accuracy."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bcut
+from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.triangulations import triangulations
+from bcut.instance import load_instance
+from bcut.objectives.objective import Objective, from_fractions, make_objective
+from bcut.solving.capping import capped_costs
+from bcut.solving.search import Part, Search
+from bcut.verification.verify import verify
+
+
+def nearly_a_cube(noise: float) -> PointConfiguration:
+    corners = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=float)
+    return PointConfiguration.from_values(corners + noise * np.random.default_rng(1).random((8, 3)))
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("sense", ["min", "max"])
+def test_slivers_do_not_spoil_sums_of_aspect_ratios(noise: float, sense: str) -> None:
+    configuration = nearly_a_cube(noise)
+    formulation = cocircuit_formulation(configuration)
+    objective = make_objective("aspect-ratio", formulation)
+    assert objective.largest_cost > 0.1 / noise
+    values = [objective.value(chosen) for chosen in triangulations(formulation.chirotope)]
+    best = min(values) if sense == "min" else max(values)
+    result = bcut.solve(configuration, objective="aspect-ratio", sense=sense)
+    assert result.status == "optimal"
+    assert result.value == pytest.approx(float(best), rel=1e-9)
+    checked = verify(result)
+    assert checked.exact_bound is not None
+    assert abs(checked.exact_bound - best) <= best / 10**6
+
+
+def search_for(costs: Any, sense: Any = "min") -> Search:
+    formulation = cocircuit_formulation(load_instance("random:7,2,seed=1"))
+    count = len(formulation.simplices)
+    entries = np.resize(np.array(costs), count)
+    objective = Objective("test", sense, entries.astype(float))
+    return Search(whole=Part.whole(formulation, objective), make_separators=list)
+
+
+def test_costs_are_capped_within_the_block_only() -> None:
+    search = search_for([1.0, 2.0, 3.0, 1e12])
+    whole = search.whole
+    with capped_costs(search):
+        assert search.value is not None
+        capped = search.whole.objective
+        assert float(search.value) < capped.largest_cost <= 4 * float(search.value)
+        dear = whole.objective.costs > capped.largest_cost
+        assert capped.costs[~dear].tolist() == whole.objective.costs[~dear].tolist()
+        assert set(capped.costs[dear]) == {capped.largest_cost}
+    assert search.whole is whole
+
+
+def test_fractions_are_capped_exactly() -> None:
+    search = search_for([1.0])
+    costs = [
+        Fraction(1, 3) if number % 4 else Fraction(10**20) for number in range(len(search.whole.columns))
+    ]
+    objective = from_fractions("test", "min", costs)
+    search.whole = Part(search.whole.formulation, objective, search.whole.columns)
+    found = {search.whole.objective.value([column]) for column in range(len(costs))}
+    assert found == {Fraction(1, 3), Fraction(10**20)}
+    with capped_costs(search):
+        capped = search.whole.objective
+        least, largest = sorted({capped.value([column]) for column in range(len(costs))})
+        assert least == Fraction(1, 3)
+        assert search.value is not None
+        assert min(search.value, Fraction(10**20)) <= largest <= 10**20
+
+
+@pytest.mark.parametrize(
+    ("costs", "sense"),
+    [([1.0, 2.0, 900.0], "min"), ([-1.0, 2.0, 1e12], "min"), ([1.0, 2.0, 1e12], "max"), ([0.0], "min")],
+)
+def test_other_costs_are_left_alone(costs: list[float], sense: str) -> None:
+    search = search_for(costs, sense)
+    whole = search.whole
+    with capped_costs(search):
+        assert search.whole is whole
+        assert search.columns is None
+
+
+def test_the_other_sense() -> None:
+    search = search_for([-1.0, -2.0, -3.0, -1e12], "max")
+    with capped_costs(search):
+        assert search.value is not None
+        assert search.whole.objective.costs.min() >= 4 * float(search.value)
+
+
+def test_no_simplices_at_all() -> None:
+    result = bcut.solve("cube:2", objective="random-costs:1", forbid=[[0]], star=0)
+    assert result.status == "infeasible"
+    assert bcut.solve("cube:2", objective="min-max:weight", forbid=[[0]], star=0).status == "infeasible"

@@ -1,0 +1,360 @@
+"""Ledgers: every cut is there, the cuts of the end give the bound again, and each follows from its proof, exactly."""
+
+from __future__ import annotations
+
+import gzip
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from laboratory import edited, ledger_file
+
+from bcut.cli.main import run
+from bcut.errors import LedgerError
+from bcut.experiments.ledger import Ledger, read_ledger
+from bcut.experiments.replay import check_ledger, replay
+
+Captured = pytest.CaptureFixture[str]
+Entries = list[dict[str, Any]]
+
+PLAN = """
+[[instances]]
+instance = "{instance}"
+{case}
+[[variants]]
+name = "it"
+{variant}
+"""
+
+ALL = 'separators = ["link", "clique:max_cuts=8", "odd-cycle:max_cuts=8"]'
+SPANNING = "spanning = true"
+RANDOM_COSTS = SPANNING + '\nobjective = "random-costs:2"'
+
+# What each ledger is made from, and the bound that it ends with, where it is known.
+MADE = {
+    "loop": ("random:16,3,seed=20", SPANNING, ALL, 29.0),
+    "loop in the plane": ("random:30,2,seed=2", RANDOM_COSTS, ALL, None),
+    "loop, degenerate": ("grid:3,3,3", SPANNING, 'separators = ["link"]', 35.0),
+    "loop with cutoff": ("random:16,3,seed=20", SPANNING + "\noptimum = 29", ALL + "\ncutoff = true", 29.0),
+    "loop, maximum": ("random:12,3,seed=4", SPANNING + '\nsense = "max"', ALL, None),
+    "root": ("random:16,3,seed=20", SPANNING, 'preset = "root"\n' + ALL, 29.0),
+    "root with cutoff": (
+        "random:16,3,seed=20",
+        SPANNING + "\noptimum = 29",
+        'preset = "root"\ncutoff = true\nscip = ["zerohalf:unlimited"]\n' + ALL,
+        29.0,
+    ),
+    "zero-half": ("random:16,3,seed=9", SPANNING, 'preset = "root"\nscip = ["zerohalf:unlimited"]', 28.0),
+    "solve": ("random:18,3,seed=8", SPANNING, 'preset = "solve"\nledger = true\n' + ALL, None),
+}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Path, dict[str, Any]]]:
+    """Make ledgers, each once."""
+    known: dict[str, tuple[Path, dict[str, Any]]] = {}
+
+    def make(name: str) -> tuple[Path, dict[str, Any]]:
+        if name not in known:
+            instance, case, variant, _ = MADE[name]
+            text = PLAN.format(instance=instance, case=case, variant=variant)
+            known[name] = ledger_file(tmp_path_factory.mktemp("ledger"), text)
+        return known[name]
+
+    return make
+
+
+Made = Callable[[str], tuple[Path, dict[str, Any]]]
+
+
+def cuts_of(ledger: Ledger, **wanted: Any) -> Entries:
+    return [cut for cut in ledger.cuts if all(cut[key] == value for key, value in wanted.items())]
+
+
+@pytest.mark.parametrize("name", [name for name in MADE if name != "solve"])
+def test_the_cuts_of_the_end_give_the_bound_again(made: Made, name: str) -> None:
+    path, record = made(name)
+    found = replay(read_ledger(path))
+    assert found.recorded == record["outcome"]["lp_after_cuts"]
+    assert found.found == pytest.approx(found.recorded, abs=1e-9, rel=1e-9)
+    assert found.agrees
+    expected = MADE[name][3]
+    if expected is not None:
+        assert found.found == pytest.approx(expected, abs=1e-6)
+        assert found.cuts > 0
+        assert found.before < found.found
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_right_hand_side_follows_from_its_proof(made: Made, name: str) -> None:
+    ledger = read_ledger(made(name)[0])
+    checks = check_ledger(ledger)
+    assert not checks.refused
+    families = Counter(cut["family"] for cut in ledger.cuts)
+    assert checks.proven == {f: n for f, n in families.items() if not f.startswith("scip:")}
+    assert checks.without_checker == {f: n for f, n in families.items() if f.startswith("scip:")}
+
+
+def test_the_ledgers_of_these_tests_hold_all_families(made: Made) -> None:
+    families = {cut["family"] for name in MADE for cut in read_ledger(made(name)[0]).cuts}
+    assert families == {"link", "clique", "odd-cycle", "scip:zerohalf"}
+    fixed = read_ledger(made("loop with cutoff")[0]).end["at_zero"]
+    assert fixed
+
+
+@pytest.mark.parametrize("name", ["loop", "root", "zero-half"])
+def test_every_cut_is_there_with_what_became_of_it(made: Made, name: str) -> None:
+    path, record = made(name)
+    ledger, counts = read_ledger(path), record["cuts"]
+    assert [cut["number"] for cut in sorted(ledger.cuts, key=lambda cut: cut["number"])] == list(
+        range(1, len(ledger.cuts) + 1)
+    )
+    for family, count in counts.items():
+        own = cuts_of(ledger, family=family)
+        assert len(own) == count["found"]
+        assert len([cut for cut in own if cut["taken"]]) == count["taken"]
+        assert len([cut for cut in own if cut["final"]]) == count["final"] >= count["active"]
+    for family, statistics in record["outcome"]["separators"].items():
+        if not family.startswith("scip:"):
+            assert statistics["added"] == (counts[family]["taken"] if family in counts else 0)
+    assert all(cut["taken"] for cut in ledger.cuts if cut["final"])
+    lps = [lp for lp, _ in record["outcome"]["rounds"]]
+    for cut in ledger.cuts:
+        assert len(cut["simplices"]) == len(cut["coefficients"])
+        assert min(abs(lp - cut["lp_before"]) for lp in lps) <= 1e-9
+        assert min(abs(lp - cut["lp_after"]) for lp in lps) <= 1e-9
+        if not cut["family"].startswith("scip:"):
+            assert cut["violation"] > 0
+            assert cut["efficacy"] == pytest.approx(
+                cut["violation"] / sum(c * c for c in cut["coefficients"]) ** 0.5
+            )
+
+
+def test_points_violate_the_cuts_that_were_found_for_them(made: Made) -> None:
+    ledger = read_ledger(made("loop")[0])
+    points = {(point["node"], point["round"]): point for point in ledger.points}
+    for cut in ledger.cuts:
+        point = points[cut["node"], cut["round"]]
+        values = {tuple(s): x for s, x in zip(point["simplices"], point["values"], strict=True)}
+        left = sum(
+            c * values.get(tuple(s), 0.0) for s, c in zip(cut["simplices"], cut["coefficients"], strict=True)
+        )
+        assert left - cut["rhs"] == pytest.approx(cut["violation"], abs=1e-6)
+        assert point["lp"] == cut["lp_before"]
+
+
+def test_what_was_fixed_before_a_cut_was_found_is_written_down(made: Made) -> None:
+    ledger = read_ledger(made("solve")[0])
+    assert ledger.end["lp"] is None
+    assert {cut["part"] for cut in ledger.cuts} == set(ledger.parts)
+    for cut in ledger.cuts:
+        left = {tuple(simplex) for simplex in ledger.parts[cut["part"]]}
+        assert {tuple(simplex) for simplex in cut["simplices"]} <= left
+    with pytest.raises(LedgerError, match="no last relaxation"):
+        replay(ledger)
+    # On all simplices, the same inequalities need not hold: weights of what had been fixed are missing.
+    ledger.parts = {}
+    assert check_ledger(ledger).refused
+
+
+def test_cuts_that_no_relaxation_was_solved_with_are_not_in_the_last_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bcut.bounds.relaxation import Relaxation
+
+    solve, calls = Relaxation.solve, Counter[str]()
+
+    def limited(self: Relaxation) -> Any:
+        calls["solve"] += 1
+        return None if calls["solve"] == 3 else solve(self)
+
+    monkeypatch.setattr(Relaxation, "solve", limited)
+    text = PLAN.format(instance="random:16,3,seed=22", case=SPANNING, variant='separators = ["link"]')
+    path, record = ledger_file(tmp_path, text)
+    assert record["outcome"]["status"] == "limit"
+    ledger = read_ledger(path)
+    assert {cut["round"] for cut in ledger.cuts if cut["taken"]} == {1, 2}
+    assert {cut["round"] for cut in ledger.cuts if cut["final"]} == {1}
+    assert {cut["lp_after"] for cut in ledger.cuts if cut["round"] == 2} == {None}
+    assert replay(ledger).agrees
+
+
+# Tampering.
+
+
+def first(entries: Entries, family: str) -> dict[str, Any]:
+    return next(entry for entry in entries if entry["record"] == "cut" and entry["family"] == family)
+
+
+def shift_rhs(family: str, by: int) -> Callable[[Entries], None]:
+    def change(entries: Entries) -> None:
+        first(entries, family)["rhs"] += by
+
+    return change
+
+
+def raise_coefficient(family: str) -> Callable[[Entries], None]:
+    def change(entries: Entries) -> None:
+        cut = first(entries, family)
+        cut["coefficients"] = [c + 1 for c in cut["coefficients"]]
+
+    return change
+
+
+def lighter_wedge(entries: Entries) -> None:
+    wedges = first(entries, "link")["proof"]["wedges"]
+    for wedge in wedges:
+        wedge[2] = 0
+
+
+def other_face(entries: Entries) -> None:
+    cut = first(entries, "link")
+    cut["proof"]["face"] = [v for v in range(16) if v not in cut["proof"]["face"]][:2]
+
+
+def swapped_cycle(entries: Entries) -> None:
+    for entry in entries:
+        if entry["record"] == "cut" and entry["family"] == "odd-cycle":
+            cycle = entry["proof"]["cycle"]
+            if len(cycle) >= 5:
+                cycle[1], cycle[2] = cycle[2], cycle[1]
+                return
+    raise AssertionError("there is no long cycle")
+
+
+def shorter_cycle(entries: Entries) -> None:
+    first(entries, "odd-cycle")["proof"]["cycle"].pop()
+
+
+def no_proof(entries: Entries) -> None:
+    first(entries, "link")["proof"] = {}
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (shift_rhs("link", 1), "its right-hand side is 1, but its proof gives 0"),
+        (shift_rhs("link", -1), "reach 0 on its left side, but its right-hand side is -1"),
+        (shift_rhs("odd-cycle", 1), "but its proof gives"),
+        (shift_rhs("odd-cycle", -1), "is all that follows"),
+        (raise_coefficient("link"), "wind around it once"),
+        (raise_coefficient("odd-cycle"), "above 1"),
+        (lighter_wedge, "but one weighs 0"),
+        (other_face, "does not contain the face"),
+        (no_proof, "names no face"),
+        (swapped_cycle, "do not cross"),
+        (shorter_cycle, "not an odd number"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_ledger_with_one_thing_changed_is_refused(
+    made: Made, change: Callable[[Entries], None], reason: str, capsys: Captured
+) -> None:
+    path = edited(made("loop")[0], change)
+    (refusal,) = check_ledger(read_ledger(path)).refused
+    assert reason in refusal[1]
+    assert run(["cuts", "verify", str(path), "--quiet"]) == 2
+    assert reason in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("by", [1, -1])
+def test_a_clique_with_another_right_hand_side_is_refused(made: Made, by: int) -> None:
+    path = edited(made("loop in the plane")[0], shift_rhs("clique", by))
+    assert len(check_ledger(read_ledger(path)).refused) == 1
+
+
+def test_a_bound_that_the_cuts_do_not_give_is_refused(made: Made, capsys: Captured) -> None:
+    def change(entries: Entries) -> None:
+        entries[-1]["lp"] += 1e-7
+
+    path = edited(made("loop")[0], change)
+    assert not replay(read_ledger(path)).agrees
+    assert run(["cuts", "replay", str(path)]) == 2
+    assert "as recorded" in capsys.readouterr().err
+    fewer = edited(made("loop")[0], lambda entries: entries[-1].update(final=[]))
+    assert replay(read_ledger(fewer)).found == pytest.approx(28.5)
+
+
+def test_points_that_were_changed_are_refused(made: Made) -> None:
+    def change(entries: Entries) -> None:
+        entries[0]["instance"]["points"][0][0] = "7"
+
+    with pytest.raises(LedgerError, match="digest"):
+        check_ledger(read_ledger(edited(made("loop")[0], change)))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda entries: entries.pop(), "is cut short"),
+        (lambda entries: entries[0].update(schema=99), "no ledger of schema"),
+        (lambda entries: entries.append(entries[-1]), "goes on after its end"),
+        (lambda entries: entries[1].pop("record"), "line 2: is no entry"),
+        (lambda entries: first(entries, "link").pop("rhs"), "has no entry 'rhs'"),
+    ],
+)
+def test_a_broken_ledger_is_refused(
+    made: Made, change: Callable[[Entries], None], says: str, capsys: Captured
+) -> None:
+    path = edited(made("loop")[0], change)
+    with pytest.raises(LedgerError, match=says):
+        read_ledger(path)
+    for command in ("show", "replay", "verify"):
+        assert run(["cuts", command, str(path)]) == 2
+        assert capsys.readouterr().err.startswith(f"Error: {path}")
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"no gzip", gzip.compress(b"no json\n"), gzip.compress(b"{}\n")[:20]]
+)
+def test_other_files_are_no_ledgers(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "other.gz"
+    path.write_bytes(content)
+    with pytest.raises(LedgerError, match=r"other\.gz"):
+        read_ledger(path)
+    with pytest.raises(LedgerError, match="there is no such file"):
+        read_ledger(tmp_path / "none.gz")
+
+
+@pytest.mark.parametrize("entry", [[[0, 1, 2, 99]], [[0, 1, 2]], [[3, 2, 1, 0]], "x", []])
+def test_a_cut_of_no_simplices_is_refused(made: Made, entry: Any) -> None:
+    path = edited(made("loop")[0], lambda entries: first(entries, "link").update(simplices=entry))
+    with pytest.raises(LedgerError, match="is malformed"):
+        check_ledger(read_ledger(path))
+
+
+# The commands.
+
+
+def test_the_table_shows_what_is_asked_for(made: Made, capsys: Captured) -> None:
+    path = str(made("loop")[0])
+    ledger = read_ledger(path)
+    assert run(["cuts", "show", path, "--limit", "0"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"random:16,3,seed=20: min cardinality, {len(ledger.cuts)} cuts"
+    assert lines[1].split()[:4] == ["cut", "family", "node", "round"]
+    assert len(lines) == 2 + len(ledger.cuts)
+    assert run(["cuts", "show", path, "--family", "link", "--final", "--limit", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    shown = cuts_of(ledger, family="link", final=True)
+    assert len(lines) == 3 + (len(shown) > 1)
+    assert lines[2].split()[1] == "link"
+    assert run(["cuts", "show", path, "--json", "--limit", "2"]) == 0
+    assert capsys.readouterr().out.count('"record": "cut"') == 2
+
+
+def test_the_commands_say_what_they_did(made: Made, capsys: Captured) -> None:
+    path = str(made("root with cutoff")[0])
+    assert run(["cuts", "replay", path]) == 0
+    assert "cuts move the bound from 28.5 to 29; recorded was 29" in capsys.readouterr().out
+    assert run(["cuts", "verify", path]) == 0
+    said = capsys.readouterr().out
+    assert " link" in said
+    assert "proven again" in said
+    for command in ("replay", "verify"):
+        assert run(["cuts", command, path, "--json"]) == 0
+        assert capsys.readouterr().out.startswith("{")
+        assert run(["cuts", command, path, "--quiet"]) == 0
+        assert not capsys.readouterr().out
