@@ -114,8 +114,8 @@ class Certificate:
     earlier : list of str
         Of a further objective of a lexicographic combination: the multiplier of each earlier objective's value.
     refutes : dict or None
-        ``{"target": rational, "stages": [{"multipliers": ..., "cuts": ...}, ...]}``: no triangulation reaches the target.
-        Each stage speaks of the simplices whose reduced costs in the one before (first: in this certificate) a
+        ``{"target": rational, "stages": [{"multipliers": ..., "cuts": ...}, ...]}``: no triangulation reaches the
+        target. Each stage speaks of the simplices whose reduced costs in the one before (first: in this certificate) a
         triangulation within the target may have; the last one's bound is beyond the target.
     reason : str or None
     """

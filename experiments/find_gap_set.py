@@ -92,7 +92,8 @@ def main() -> None:
     kind = "root LP rounded is not the optimum" if options.hard else "root LP differs from the optimum"
     head = {
         "name": options.output.stem,
-        "description": f"Problems whose {kind}" + (", and larger ones." if options.further is not None else "."),
+        "description": f"Problems whose {kind}"
+        + (", and larger ones." if options.further is not None else "."),
         "found_by": "python experiments/find_gap_set.py; lp is the root LP of formulation 2 without cuts, the optimum "
         f"was proven by bcut solve {code['bcut']} with SCIP {code['scip']} and HiGHS {code['highs']}",
         "chosen": {

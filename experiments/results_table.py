@@ -39,8 +39,8 @@ multipliers and what they prove. This page is written by `python experiments/res
 * bounds only: the best triangulation found, and the best bound that is proven exactly.
 
 "Root LP" is the optimum of the linear relaxation, "with cuts" that with averaged link cuts
-([link-cuts.md](link-cuts.md)). The number of simplices counts all affinely independent sets of d + 1 points (for spanning triangulations, those that
-contain no other point).
+([link-cuts.md](link-cuts.md)). The number of simplices counts all affinely independent sets of d + 1 points (for
+spanning triangulations, those that contain no other point).
 
 | configuration | points | dim | simplices | | size | root LP | with cuts | |
 |---|--:|--:|--:|---|--:|--:|--:|---|

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
@@ -52,6 +53,28 @@ def test_every_key_of_a_plan_is_explained(section: str, keys: set[str]) -> None:
     for row in found[1].splitlines():
         explained |= set(re.findall(r"`\[*(\w+)", row.split("|")[1]))
     assert keys <= explained
+
+
+def test_what_the_page_says_of_the_collections_is_in_them() -> None:
+    import bcut.instances
+
+    gap_set, hard_set = (
+        json.loads(bcut.instances.path(name).read_text()) for name in ("gap-set", "hard-set")
+    )
+    chosen = {label: tuple(text.split(" of ")) for label, text in gap_set["chosen"].items()}
+    random = [chosen[f"random 3D, n = {n}, spanning, min"] for n in range(12, 25, 2)]
+    assert {total for _, total in random} == {"30"}
+    assert f"| {', '.join(some for some, _ in random)} of 30 each |" in PAGE
+    for label in ("sphere 3D, max", "random costs 2D, spanning, min", "random costs 3D, spanning, min"):
+        assert f"| {' of '.join(chosen[label])} |" in PAGE
+    assert sum(int(some) for some, _ in chosen.values()) == len(gap_set["members"])
+    integral = {
+        (member["instance"], str(round(member["lp"])), str(member["optimum"]))
+        for member in hard_set["members"]
+        if "optimum" in member and abs(member["lp"] - round(member["lp"])) < 1e-6
+        if abs(member["lp"] - member["optimum"]) > 0.5
+    }
+    assert integral == set(re.findall(r"\| `(\S+)`, .* \| (\d+) \| (\d+) \|", PAGE))
 
 
 def test_every_preset_is_explained() -> None:

@@ -121,7 +121,7 @@ def test_means_are_over_the_instances_with_a_gap(tables: dict[str, list[dict[str
         assert (found["runs"], found["with_gap"]) == (4, len(with_gap)) == (4, 3)
         assert found["gap_closed"] == pytest.approx(sum(with_gap) / 3)
     space = row(tables["gap"], **{"class": "space", "variant": "only link"})
-    assert (space["instances"], space["entirely"], space["integral"]) == (2, 2, 2)
+    assert (space["instances"], space["entirely"], space["settled"]) == (2, 2, 2)
     assert space["least"] == pytest.approx(1)
 
 

@@ -47,6 +47,12 @@ MADE = {
         29.0,
     ),
     "zero-half": ("random:16,3,seed=9", SPANNING, 'preset = "root"\nscip = ["zerohalf:unlimited"]', 28.0),
+    "zero-half and link": (
+        "random:12,3,seed=1000",
+        SPANNING,
+        'preset = "root"\nscip = ["zerohalf"]\nseparators = ["link"]',
+        17.0,
+    ),
     "solve": ("random:18,3,seed=8", SPANNING, 'preset = "solve"\nledger = true\n' + ALL, None),
 }
 
@@ -250,13 +256,20 @@ def no_proof(entries: Entries) -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_a_ledger_with_one_thing_changed_is_refused(
-    made: Made, change: Callable[[Entries], None], reason: str, capsys: Captured
+    made: Made, change: Callable[[Entries], None], reason: str
 ) -> None:
-    path = edited(made("loop")[0], change)
-    (refusal,) = check_ledger(read_ledger(path)).refused
+    (refusal,) = check_ledger(read_ledger(edited(made("loop")[0], change))).refused
     assert reason in refusal[1]
-    assert run(["cuts", "verify", str(path), "--quiet"]) == 2
-    assert reason in capsys.readouterr().err
+
+
+def test_the_command_refuses_a_changed_right_hand_side(made: Made, capsys: Captured) -> None:
+    path = str(edited(made("zero-half and link")[0], shift_rhs("link", 1)))
+    assert run(["cuts", "verify", path, "--quiet"]) == 2
+    captured = capsys.readouterr()
+    assert "its right-hand side is 1, but its proof gives 0" in captured.err
+    assert not captured.out
+    assert run(["cuts", "verify", path, "--json"]) == 2
+    assert '"reason": "link cut' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("by", [1, -1])

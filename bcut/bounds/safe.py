@@ -53,7 +53,7 @@ class SafeBound:
     @property
     def unit(self) -> Fraction:
         """What the integers count: ``2**-shift``."""
-        return _unit(self.shift)
+        return unit_of(self.shift)
 
     def restricted_to(self, columns: NDArray[np.integer]) -> SafeBound:
         """Return the same bound with the reduced costs of some columns only."""
@@ -96,14 +96,14 @@ def safe_bound(
     if row_shifts is not None and row_shifts.any():
         return _safe_bound_with_large_rows(matrix, lower, upper, objective, duals, row_shifts)
     shift = _shift(matrix, objective, duals)
-    costs = _scaled_costs(objective, shift)
+    costs = scaled_costs(objective, shift)
     multipliers = _multipliers(duals, shift, lower, upper)
     reduced = costs - matrix.T.astype(np.int64) @ multipliers
     sides = np.where(multipliers > 0, lower, upper)
     active = multipliers != 0
     scaled = sum(int(y) * int(b) for y, b in zip(multipliers[active], sides[active], strict=True) if b)
     scaled += int(np.minimum(reduced, 0).sum())
-    return SafeBound(scaled * _unit(shift), multipliers, reduced, shift)
+    return SafeBound(scaled * unit_of(shift), multipliers, reduced, shift)
 
 
 def _multipliers(
@@ -136,7 +136,7 @@ def _safe_bound_with_large_rows(
     shift = _shift(shown, objective, duals)
     multipliers = _multipliers(duals, shift, lower, upper)
     small = np.where(row_shifts > 0, 0, multipliers)
-    reduced = _scaled_costs(objective, shift) - matrix.T.astype(np.int64) @ small
+    reduced = scaled_costs(objective, shift) - matrix.T.astype(np.int64) @ small
     sides = np.where(multipliers > 0, lower, upper)
     scaled = sum(int(y) * int(b) for y, b in zip(small, sides, strict=True) if y)
     for row in large.tolist():
@@ -147,14 +147,14 @@ def _safe_bound_with_large_rows(
             reduced[matrix.indices[part]] -= np.array(products, dtype=np.int64)
             scaled += y * int(sides[row]) >> bits
     scaled += int(np.minimum(reduced, 0).sum())
-    return SafeBound(scaled * _unit(shift), multipliers, reduced, shift)
+    return SafeBound(scaled * unit_of(shift), multipliers, reduced, shift)
 
 
-def _unit(shift: int) -> Fraction:
+def unit_of(shift: int) -> Fraction:
     return Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
 
 
-def _scaled_costs(objective: Objective, shift: int) -> NDArray[np.int64]:
+def scaled_costs(objective: Objective, shift: int) -> NDArray[np.int64]:
     """Return ``floor(sign * cost * 2**shift)``, exactly."""
     if objective.are_doubles:
         signed = objective.sign * objective.numerators
@@ -176,10 +176,10 @@ def _shift(matrix: sp.csr_matrix, objective: Objective, duals: NDArray[np.floati
     if largest_cost == largest_dual == 0.0:
         return SHIFT
     # Exponents of two, rounded up, so that nothing overflows on the way.
-    size = max(_exponent(largest_cost), _exponent(largest_dual) + entries.bit_length()) + 1
+    size = max(exponent_of(largest_cost), exponent_of(largest_dual) + entries.bit_length()) + 1
     return min(SHIFT - min(0, size), 61 - columns.bit_length() - size)
 
 
-def _exponent(value: float) -> int:
+def exponent_of(value: float) -> int:
     """Return the least k with ``value < 2**k``."""
     return frexp(value)[1] if value else -1074

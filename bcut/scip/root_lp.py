@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pyscipopt import Variable
 
-# SCIP_ROWORIGINTYPE_CONS: a row that is a constraint of the model. PySCIPOpt has no name for it. All others are cuts, of
-# separators or of constraint handlers.
+# SCIP_ROWORIGINTYPE_CONS, a row that is a constraint of the model; PySCIPOpt has no name for it. All others are cuts,
+# of separators or of constraint handlers.
 _OF_THE_MODEL = 2
 _INTEGRAL = 1e-9
+# Names of rows that are not those of the separators that made them.
+_MADE_BY = {"gom": "gomory", "scg": "gomory"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,8 @@ def _family(name: str, families: set[str]) -> str:
     if name in families:
         return name
     # SCIP numbers its rows, as in "zerohalf12_3".
-    return "scip:" + (re.match(r"[A-Za-z]+", name) or [name])[0]
+    kind = (re.match(r"[A-Za-z]+", name) or [name])[0]
+    return "scip:" + _MADE_BY.get(kind, kind)
 
 
 def _snapped(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -34,8 +34,15 @@ def make_certificate(
         A value of ``sign * objective`` that no triangulation reaches, and why. The first stage has the columns that
         `bound` leaves.
     """
+    if formulation.name not in ("2", "chambers"):
+        return Certificate(
+            reason=f"the bound was proven with the rows of formulation {formulation.name}, which are not written"
+        )
+    if len(bound.multipliers) > len(formulation.row_faces):
+        return Certificate(reason="the bound was proven with rows that were added as points violated them")
     refutes = None
-    if refutation is not None:
+    # Stages are re-checked with cocircuit rows; their cuts are those of triangulations.
+    if refutation is not None and formulation.name == "2":
         target, stages = refutation
         refutes = {"target": str(objective.sign * target), "stages": [_stage(stage) for stage in stages]}
     return Certificate(

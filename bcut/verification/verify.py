@@ -317,7 +317,10 @@ class _Verifier:
             return None
         symmetries = data.certificate.symmetries
         if data.dissection and (
-            data.certificate.cocircuits or data.certificate.cuts or symmetries is not None
+            data.certificate.cocircuits
+            or data.certificate.cuts
+            or data.certificate.refutes is not None
+            or symmetries is not None
         ):
             raise VerificationError(
                 "its certificate uses rows that triangulations satisfy, but the problem is about dissections"

@@ -174,7 +174,7 @@ def _heat(experiment: Experiment, gap: Table) -> dict[str, Any] | None:
             shown.append(
                 {
                     "text": "" if row is None else f"{100 * row['gap_closed']:.1f}",
-                    "title": "" if row is None else f"{row['integral']} of {row['instances']} integral",
+                    "title": "" if row is None else f"{row['settled']} of {row['instances']} settled",
                     "shade": None if share is None else f"{0.06 + 0.6 * share:.2f}",
                 }
             )

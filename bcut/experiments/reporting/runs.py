@@ -13,6 +13,8 @@ from bcut.experiments.store import Store
 
 # A root LP this close to the optimum, relative to it, leaves no gap to close.
 _GAP = 1e-6
+# Of a share of the gap.
+_DIGITS = 9
 _SETTLED = ("optimal", "infeasible")
 _ROOT_PRESETS = ("loop", "root")
 
@@ -79,7 +81,8 @@ class Run:
             return None
         assert self.optimum is not None
         assert self.lp is not None
-        return (lp - self.lp) / (self.optimum - self.lp)
+        # Without the noise of the relaxations; adding zero turns -0.0 into 0.0.
+        return round((lp - self.lp) / (self.optimum - self.lp), _DIGITS) + 0.0
 
     @property
     def gap_closed(self) -> float | None:

@@ -111,7 +111,7 @@ def gap_table(experiment: Experiment) -> Table:
                         "gap_closed": mean(closed),
                         "least": min(closed),
                         "entirely": sum(share >= 1 - 1e-6 for share in closed),
-                        "integral": sum(bool(run.outcome["integral"]) for run in with_gap),
+                        "settled": sum(run.settled for run in with_gap),
                         "seconds": shifted_geometric_mean([run.seconds for run in with_gap], SHIFT_SECONDS),
                     }
                 )
@@ -160,7 +160,7 @@ def ablation_table(experiment: Experiment) -> Table:
 
 
 def _difference(larger: float | None, smaller: float | None) -> float | None:
-    return None if larger is None or smaller is None else larger - smaller
+    return None if larger is None or smaller is None else round(larger - smaller, 9) + 0.0
 
 
 def families_table(experiment: Experiment) -> Table:
