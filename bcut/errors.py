@@ -21,6 +21,10 @@ class ConfigurationError(InputError):
     """Points that are no point configuration: duplicates, too small a dimension, not finite, not exact."""
 
 
+class SurfaceError(InputError):
+    """Triangles that bound no region: not closed, crossing each other, or wrongly oriented."""
+
+
 class TooLargeError(InputError):
     """A configuration whose simplices are too many to be listed in memory."""
 

@@ -148,9 +148,7 @@ class Columns:
         """Return some of the columns; rows stay."""
         lengths = np.diff(self.starts)[columns]
         kept = _ranges(self.starts[:-1][columns], lengths)
-        return Columns(
-            self.rows, self.fixed[columns], _starts(lengths), self.places[kept], self.values[kept]
-        )
+        return Columns(self.rows, self.fixed[columns], _starts(lengths), self.places[kept], self.values[kept])
 
     def sparse(self) -> sp.csc_array:
         """Return the matrix, shape (rows, m), of int32 or float64."""

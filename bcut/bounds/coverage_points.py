@@ -4,11 +4,11 @@ The cocircuit form says once that a generic point p is covered exactly once, and
 simplex to simplex. Walk from p to another generic point q: where the way crosses a (d-1)-simplex f, the simplices
 behind f come in place of those before it, so
 
-    coverage(q)  =  coverage(p)  +  sum over the f that are crossed of (1 or -1, the side of f that q is on) * row(f).
+    coverage(q)  =  coverage(p)  +  sum over the f that are crossed of (side of f that q is on) * row(f).
 
-A linear relaxation gains nothing from these rows, but first-order methods do: without them, news travels one simplex per
-iteration. Crossings are found in floating-point arithmetic. That is safe, since any combination of rows is valid:
-where a sign is wrong, the row helps less.
+A linear relaxation gains nothing from these rows, but first-order methods do: without them, news travels from one
+simplex to the next in each iteration. Crossings are found in floating-point arithmetic. That is safe, since any
+combination of rows is valid: where a sign is wrong, the row helps less.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 # As many points as repay the longer columns.
 _POINTS = 64
-# Further entries for each column, at most.
-_ENTRIES = 2.0
 # Of so many random points the most distant ones are taken.
 _CANDIDATES = 16
 
 
-def coverage_points(program: CompactProgram | Formulation, *, points: int = _POINTS, seed: int = 0) -> sp.csr_array:
+def coverage_points(
+    program: CompactProgram | Formulation, *, points: int = _POINTS, seed: int = 0
+) -> sp.csr_array:
     """Return combinations of rows that are coverage rows of further points.
 
     Parameters
@@ -52,7 +52,7 @@ def coverage_points(program: CompactProgram | Formulation, *, points: int = _POI
     floats = program.configuration.floats
     faces, apexes, signs = _faces(program)
     source = _flag_point(floats)
-    targets = _spread(floats, points, np.random.default_rng(seed))
+    targets = spread_points(floats, points, np.random.default_rng(seed))
     inverse, usable = _inverses(floats[faces] - source)
     # The side that the apex is on, relative to that of the source.
     heights = np.einsum("rij,rj->ri", inverse, floats[apexes] - source).sum(axis=1)
@@ -65,14 +65,13 @@ def coverage_points(program: CompactProgram | Formulation, *, points: int = _POI
         columns.append(np.concatenate(([0], crossed + 1)))
         values.append(np.concatenate(([1], beyond[crossed])))
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    combinations = sp.csr_array(entries, shape=(len(targets), len(faces) + 1), dtype=np.int32)
-    return combinations
+    return sp.csr_array(entries, shape=(len(targets), len(faces) + 1), dtype=np.int32)
 
 
 def _faces(
     program: CompactProgram | Formulation,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the vertices of the face of each homogeneous row, the apex of one of its simplices, and the entry there."""
+    """Return the face of each homogeneous row, the apex of one of its simplices, and the entry of that."""
     from bcut.formulations.formulation import Formulation
 
     if isinstance(program, Formulation):
@@ -105,19 +104,36 @@ def _flag_point(floats: NDArray[np.float64]) -> NDArray[np.float64]:
             chosen.append(point)
         if len(chosen) == d + 1:
             break
-    return chosen[0] + sum(step ** (k + 1) * (point - chosen[0]) for k, point in enumerate(chosen[1:]))
+    source = chosen[0].copy()
+    for k, point in enumerate(chosen[1:]):
+        source += step ** (k + 1) * (point - chosen[0])
+    return source
 
 
 def _inverses(edges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the inverses of the transposed matrices, and which of them exist."""
     matrices = np.swapaxes(edges, 1, 2).copy()
-    usable = np.abs(np.linalg.det(matrices)) > 0
+    usable: NDArray[np.bool_] = np.abs(np.linalg.det(matrices)) > 0
     matrices[~usable] = np.eye(matrices.shape[1])
-    return np.linalg.inv(matrices), usable
+    return np.asarray(np.linalg.inv(matrices), dtype=np.float64), usable
 
 
-def _spread(floats: NDArray[np.float64], count: int, generator: np.random.Generator) -> NDArray[np.float64]:
-    """Return points of the convex hull that are far from each other."""
+def spread_points(
+    floats: NDArray[np.float64], count: int, generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Draw points of the convex hull that are far from each other.
+
+    Parameters
+    ----------
+    floats : ndarray of float, shape (n, d)
+        The points whose hull it is.
+    count : int
+    generator : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray of float, shape (count, d)
+    """
     from scipy.spatial import Delaunay
 
     cells = floats[Delaunay(floats, qhull_options="QJ Pp").simplices]

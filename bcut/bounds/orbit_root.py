@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bcut.bounds.large_program import LARGE, solve_large_program
 from bcut.bounds.linear_program import LinearProgram, solve_linear_program
 from bcut.formulations.orbit_cocircuits import OrbitFormulation
 from bcut.objectives.objective import Objective
@@ -76,7 +77,7 @@ class OrbitRoot:
     point : ndarray of float or None
         X, the sums of x over the orbits.
     bound : OrbitBound or None
-        Proven by the duals.
+        Proven by the duals. Of a program with very many orbits there is one after a limit, too.
     """
 
     status: Literal["optimal", "infeasible", "limit"]
@@ -107,17 +108,17 @@ def orbit_root(
     if not len(formulation.simplices):
         return OrbitRoot("infeasible")
     program = _program(formulation, objective)
-    solution = solve_linear_program(program, method=method, seconds=seconds)
-    if solution.status != "optimal":
+    large = len(program.costs) >= LARGE
+    solve = solve_large_program if large else solve_linear_program
+    solution = solve(program, method=method, seconds=seconds)
+    if solution.status == "infeasible" or (solution.status == "limit" and not large):
         return OrbitRoot(solution.status)
-    return OrbitRoot(
-        "optimal",
-        objective.sign * solution.value,
-        solution.x,
-        safe_orbit_bound(
-            formulation, objective, _unscaled(formulation, solution.duals[1:]), float(solution.duals[0])
-        ),
+    bound = safe_orbit_bound(
+        formulation, objective, _unscaled(formulation, solution.duals[1:]), float(solution.duals[0])
     )
+    if solution.status == "limit":
+        return OrbitRoot("limit", bound=bound)
+    return OrbitRoot("optimal", objective.sign * solution.value, solution.x, bound)
 
 
 def _program(formulation: OrbitFormulation, objective: Objective) -> LinearProgram:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.determinants import orientation_signs
 
-# Points whose sides are looked at before the facets that are settled are left out.
-_POINTS = 4
+# Points whose sides are looked at before the facets that are settled are left out: at least so many, and more where few
+# facets are left.
+_POINTS, _TUPLES = 4, 1 << 16
 
 
 def lie_in_boundary(configuration: PointConfiguration, facets: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -32,14 +33,14 @@ def lie_in_boundary(configuration: PointConfiguration, facets: NDArray[np.intege
     has_plus = np.zeros(len(facets), dtype=bool)
     has_minus = np.zeros(len(facets), dtype=bool)
     undecided = np.arange(len(facets))
-    for start in range(0, configuration.n, _POINTS):
-        points = far_out_first[start : start + _POINTS]
+    start = 0
+    while start < configuration.n and len(undecided):
+        points = far_out_first[start : start + max(_POINTS, _TUPLES // len(undecided))]
+        start += len(points)
         rows = np.repeat(facets[undecided], len(points), axis=0)
         tuples = np.concatenate((rows, np.tile(points, len(undecided))[:, None]), axis=1)
         signs = orientation_signs(configuration, tuples).reshape(len(undecided), len(points))
         has_plus[undecided] |= (signs > 0).any(axis=1)
         has_minus[undecided] |= (signs < 0).any(axis=1)
         undecided = undecided[~(has_plus & has_minus)[undecided]]
-        if not len(undecided):
-            break
     return ~(has_plus & has_minus)

@@ -121,8 +121,12 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
         return
     objective = stage.objective
     search.raise_bound(objective.rounded_up(search.bound))
+    refuted = 0
     while not is_optimal(search):
-        target = search.bound
+        # With large costs there may be many values below the optimum: the target moves in growing steps.
+        target = search.bound + ((1 << max(0, refuted - 1)) - 1) * objective.unit
+        if best.value is not None:
+            target = min(target, search.sign * best.value - objective.unit)
         try:
             formulation, costs = stage.residual(target)
         except TooLargeError:
@@ -135,6 +139,7 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             # Also after Ctrl-C: what is handed out is a triangulation in any case.
             best.keep(search)
         if outcome == "refuted":
+            refuted += 1
             search.raise_bound(target + objective.unit)
         elif outcome != "reached":
             search.status = outcome
@@ -225,7 +230,7 @@ def _reach(
     cutoff = target + stage.objective.unit / 2
     decided = ""
     if len(part.columns) <= _SMALL:
-        decided = branch(search, part, None, cutoff=float(search.sign * cutoff), seconds=_SECONDS_FOR_SMALL)
+        decided = _branch(search, part, cutoff, seconds=_SECONDS_FOR_SMALL)
     if decided in ("", "limit") and not is_optimal(search):
         _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=inf)
     if is_optimal(search):
@@ -235,12 +240,20 @@ def _reach(
         search.whole = part
         if is_optimal(search):
             return "reached"
-        decided = branch(search, part, None, cutoff=float(search.sign * cutoff))
+        decided = _branch(search, part, cutoff)
     if is_optimal(search):
         return "reached"
     if decided == "infeasible":
         return "refuted"
     return "interrupted" if decided == "interrupted" else "limit"
+
+
+def _branch(search: Search, part: Part, cutoff: Fraction, *, seconds: float | None = None) -> str:
+    """Let SCIP search a part with all triangulations below the cutoff; the best of them is the best of all."""
+    status = branch(search, part, None, cutoff=float(search.sign * cutoff), seconds=seconds)
+    if status == "optimal" and search.value is not None:
+        search.raise_bound(search.sign * search.value)
+    return status
 
 
 def _improve(search: Search, stage: OrbitStage, target: Fraction, best: _Best) -> None:

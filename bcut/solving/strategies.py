@@ -26,9 +26,15 @@ def solve_by_targets(search: Search) -> None:
         _note_infeasible(search, root)
         return
     search.exact = root.first
+    reach_targets(search)
+
+
+def reach_targets(search: Search) -> None:
+    """Solve from target to target, with the exact bound of the whole, ``search.exact``, known."""
+    assert search.exact is not None
     objective = search.whole.objective
     unit = objective.unit
-    search.raise_bound(objective.rounded_up(root.first.value))
+    search.raise_bound(objective.rounded_up(search.exact.value))
     refuted = 0
     while not is_optimal(search):
         assert search.bound is not None

@@ -15,6 +15,7 @@ from bcut.verification.crossing_cuts import check_clique, check_odd_cycle
 from bcut.verification.cut_data import Candidates, CertificateCut, cross
 from bcut.verification.exact_points import SideTable
 from bcut.verification.link_cuts import check_link
+from bcut.verification.parity_cuts import check_parity
 from bcut.verification.polygon_cuts import check_convex_polygon
 
 Checker = Callable[[SideTable, CertificateCut], Fraction]
@@ -24,6 +25,7 @@ CUT_CHECKERS: dict[str, Checker] = {
     "odd-cycle": check_odd_cycle,
     "link": check_link,
     "convex-polygon": check_convex_polygon,
+    "parity": check_parity,
 }
 
 __all__ = ["CUT_CHECKERS", "Candidates", "CertificateCut", "Checker", "check_clique", "cross", "cut_checker"]

@@ -1,0 +1,98 @@
+"""How much memory the process uses, and a limit on it and on its time that reaches every stage of a solve."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+GIB = 1 << 30
+
+# Seconds between two looks, and those that a stage has after the deadline to end by itself.
+_PERIOD, _GRACE = 0.05, 1.0
+
+
+@dataclass
+class Watch:
+    """What a watched block ran into.
+
+    Attributes
+    ----------
+    reached : {"", "memory", "time"}
+        The limit that ended it.
+    """
+
+    reached: str = ""
+
+
+def used_memory() -> int:
+    """Return the bytes of memory that the process has in use now; its peak where the system tells no more."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return peak_memory()
+
+
+def peak_memory() -> int:
+    """Return the most memory that the process has used, in bytes; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    import sys
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    # Bytes on macOS, kibibytes elsewhere.
+    return int(peak) if sys.platform == "darwin" else int(peak) * 1024
+
+
+@contextmanager
+def watched(*, memory: float | None, deadline: float | None) -> Iterator[Watch]:
+    """Interrupt the block, as Ctrl-C would, when the process uses too much memory or has no more time.
+
+    Solvers and loops hear an interrupt within a moment and keep what they have found, and so one mechanism serves all
+    stages; those that watch the deadline themselves end before this does.
+
+    Parameters
+    ----------
+    memory : float or None
+        In GiB.
+    deadline : float or None
+        Value of `time.monotonic`.
+
+    Yields
+    ------
+    Watch
+        Tells afterwards whether an interrupt came from here. Nothing is watched outside the main thread, where
+        interrupts do not arrive.
+    """
+    watch = Watch()
+    if (memory is None and deadline is None) or threading.current_thread() is not threading.main_thread():
+        yield watch
+        return
+    ended = threading.Event()
+
+    def look() -> None:
+        while not ended.wait(_PERIOD):
+            if memory is not None and used_memory() > memory * GIB:
+                watch.reached = "memory"
+            elif deadline is not None and time.monotonic() > deadline + _GRACE:
+                watch.reached = "time"
+            else:
+                continue
+            os.kill(os.getpid(), signal.SIGINT)
+            return
+
+    watcher = threading.Thread(target=look, name="bcut-limits", daemon=True)
+    watcher.start()
+    try:
+        yield watch
+    finally:
+        ended.set()
+        watcher.join()
