@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from bcut.solving.api import solve as solve
     from bcut.solving.export import export as export
     from bcut.solving.information import info as info
+    from bcut.solving.region import region as region
     from bcut.solving.regularity import regular as regular
     from bcut.verification.verify import verify as verify
 
@@ -48,6 +49,7 @@ _HOMES = {
     "info": "bcut.solving.information",
     "load_instance": "bcut.instance",
     "plot": "bcut.plotting.plot",
+    "region": "bcut.solving.region",
     "regular": "bcut.solving.regularity",
     "solve": "bcut.solving.api",
     "verify": "bcut.verification.verify",

@@ -8,7 +8,8 @@ the doubles of the sphere as the rationals that they are. Of irrational points i
 computes for it. Where the points have affine symmetries, TOPCOM also runs with generators of their group; `bcut solve`
 is told of none. polymake, where it is installed, computes its lower bound for rational points.
 
-A run that the time limit ends counts with the time that it took until then, so its ratio is a lower bound; with `>`.
+A run that the limit on processor time ends counts with the time that it took until then, so its ratio is a lower bound;
+with `>`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import json
 import re
 import resource
 import shutil
+import signal
 import statistics
 import subprocess
 import sys
@@ -67,24 +69,24 @@ class Contestant:
     value: int | None = None
     ended: bool = False
 
-    def run(self, limit: float) -> None:
+    def run(self, limit: int) -> None:
         """Run once, as a whole process; its output goes to a file, which survives the end that a limit brings."""
         with tempfile.TemporaryFile("w+") as stdin, tempfile.TemporaryFile("w+") as stdout:
             stdin.write(self.stdin)
             stdin.seek(0)
             started, used = time.perf_counter(), _processor_time()
-            with subprocess.Popen(
-                self.command, stdin=stdin, stdout=stdout, stderr=subprocess.DEVNULL
-            ) as process:
-                try:
-                    process.wait(limit)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    self.ended = True
+            finished = subprocess.run(
+                self.command,
+                stdin=stdin,
+                stdout=stdout,
+                stderr=subprocess.DEVNULL,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1)),
+            )
+            self.ended = finished.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
             self.wall.append(time.perf_counter() - started)
             self.processor.append(_processor_time() - used)
-            if not self.ended and process.returncode:
-                raise RuntimeError(f"{' '.join(self.command)} ended with status {process.returncode}")
+            if not self.ended and finished.returncode:
+                raise RuntimeError(f"{' '.join(self.command)} ended with status {finished.returncode}")
             stdout.seek(0)
             self.value = _simplices(stdout.read())
 
@@ -150,7 +152,7 @@ def _chirotope(configuration: PointConfiguration) -> str:
     return f"{n},{size}:\n{signs}\n"
 
 
-def compare(instance: str, entrants: list[Contestant], *, runs: int, limit: float) -> None:
+def compare(instance: str, entrants: list[Contestant], *, runs: int, limit: int) -> None:
     """Run all commands in turn, several times; print medians, and ratios of processor time to that of `bcut`."""
     for _ in range(runs):
         for entrant in entrants:
@@ -183,9 +185,11 @@ def main() -> None:
         help="what to compare on",
     )
     parser.add_argument("--runs", type=int, default=5, help="runs of every command (default 5)")
-    parser.add_argument("--time-limit", type=float, default=300, help="seconds per run (default 300)")
+    parser.add_argument(
+        "--time-limit", type=int, default=300, help="seconds of processor time per run (default 300)"
+    )
     options = parser.parse_args()
-    print(f"# at most {options.time_limit:g} s a run", flush=True)
+    print(f"# at most {options.time_limit} s of processor time a run", flush=True)
     for instance in options.instances:
         for entrants in (contestants(instance), bounds(instance)):
             if len(entrants) > 1:

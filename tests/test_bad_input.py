@@ -160,7 +160,7 @@ TABLE = [
     option("random:3,5", r"N must be at least D \+ 1 = 6, not 3"),
     option("random:9,3,speed=1", r"no parameter 'speed=1'", r"random:N,D"),
     option("icosahedron:3", r"no parameter '3'", r"without parameters"),
-    option("random:2000,3,seed=1", r"2000 points in dimension 3", r"at most 60,000,000", r"fewer points"),
+    option("random:2000,3,seed=1", r"2000 points in dimension 3", r"1,999,000 ridges", r"ewer points"),
     option("''", r"no instance ''", r"a family"),
     # Options.
     option("cube:3 --time-limit -1", r"time limit -1", r"not negative"),

@@ -6,7 +6,7 @@ import pytest
 
 import bcut
 from bcut.errors import InputError
-from bcut.solving import api, by_orbits
+from bcut.solving import by_orbits, methods
 
 CASES = [
     ("cube:3", False),
@@ -76,7 +76,7 @@ def test_an_interrupt_leaves_the_triangulation_that_took_no_search(monkeypatch: 
 
 
 def test_other_families_than_link_get_the_listing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(api, "_ORBITS_FROM", 10)
+    monkeypatch.setattr(methods, "_ORBITS_FROM", 10)
     assert bcut.bound("cube:3", separators=["link"]).problem.method == "orbits"
     assert bcut.bound("cube:3", separators=[]).problem.method == "orbits"
     assert bcut.bound("cube:3", separators=["link", "clique"]).problem.method == "listing"

@@ -36,14 +36,14 @@ def listed(name: str, *, spanning: bool = True) -> CompactProgram:
     return compact_program(bcut.load_instance(name), spanning=spanning)
 
 
-def as_program(program: CompactProgram, costs: np.ndarray, *, points: int = 8) -> Program:
+def as_program(program: CompactProgram, costs: np.ndarray, *, points: int | None = 8) -> Program:
     columns = Columns.of_facets(
         program.facet_rows, program.facet_signs, program.coverage, len(program.row_faces)
     )
     sides = np.zeros(columns.rows)
     sides[0] = 1.0
     result = Program(columns, costs, sides, sides.copy(), 1.0)
-    return result.with_combinations(coverage_points(program, points=points)) if points else result
+    return result.with_combinations(coverage_points(program, points=points)) if points != 0 else result
 
 
 def optimum(matrix: Any, costs: np.ndarray, right: np.ndarray) -> float:
@@ -113,11 +113,20 @@ def test_rows_are_scaled_to_mean_entries_of_one() -> None:
     "name",
     ["random:14,2,seed=1", "random:12,3,seed=2", "random:10,4,seed=3", "sphere:14,3,seed=5", "grid:4,4"],
 )
-def test_coverage_points_mark_simplices_that_contain_a_point(name: str) -> None:
+def test_coverage_points_mark_simplices_that_contain_a_point(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     configuration = bcut.load_instance(name)
     formulation = cocircuit_formulation(configuration, spanning=True)
+    drawn: list[np.ndarray] = []
+
+    def drawing(*arguments: Any) -> np.ndarray:
+        drawn.append(spread_points(*arguments))
+        return drawn[-1]
+
+    monkeypatch.setattr("bcut.bounds.coverage_points.spread_points", drawing)
     rows = (coverage_points(formulation, points=12) @ formulation.matrix.astype(np.int64)).toarray()
-    targets = spread_points(configuration.floats, 12, np.random.default_rng(0))
+    (targets,) = drawn
     corners = configuration.floats[formulation.simplices]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
     for row, target in zip(rows, targets, strict=True):
@@ -140,6 +149,15 @@ def test_coverage_points_of_arrays_are_those_of_the_formulation() -> None:
     ordinary = cocircuit_formulation(configuration, spanning=True)
     first, second = coverage_points(program, points=5), coverage_points(ordinary, points=5)
     np.testing.assert_array_equal(first.toarray(), second.toarray())
+
+
+def test_the_number_of_points_follows_the_columns() -> None:
+    """The further rows lengthen the columns by less than one entry on the average."""
+    few, many = listed("random:16,3,seed=1"), listed("random:160,2,seed=1")
+    assert coverage_points(few).shape[0] < coverage_points(many).shape[0]
+    for program in (few, many):
+        further = coverage_points(program) @ program.matrix().astype(np.int32)
+        assert 0.2 < further.nnz / len(program.simplices) < 0.8
 
 
 def test_multipliers_of_combinations_become_those_of_rows() -> None:

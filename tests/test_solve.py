@@ -294,7 +294,7 @@ def test_a_result_says_what_was_asked_and_found() -> None:
     question = result.problem
     assert (question.objective, question.sense, question.spanning) == ("cardinality", "min", True)
     assert (question.formulation, question.separators, question.seed) == ("2", ["link", "hull-like"], 3)
-    assert question.limits == {"time": 50}
+    assert question.limits == {"time": 50, "memory": None}
     assert result.instance.name == "random:12,3,seed=1000"
     assert len(result.instance.points) == 12
     formulation = cocircuit_formulation(load_instance("random:12,3,seed=1000"), spanning=True)
@@ -454,7 +454,7 @@ def test_a_separator_that_is_invalid_is_not_believed_for_a_triangulation(
         ({"time_limit": float("nan")}, "time limit nan"),
         ({"time_limit": float("inf")}, "finite number of seconds"),
         ({"seed": -1}, "seed -1"),
-        ({"method": "magic"}, "unknown method 'magic': known are auto, listing, orbits, scip"),
+        ({"method": "magic"}, "unknown method 'magic': known are auto, listing, orbits, fixing, scip"),
         ({"formulation": "7"}, "unknown formulation '7'"),
         ({"sense": "best"}, "'min' or 'max'"),
         ({"objective": "beauty"}, "unknown objective 'beauty'"),

@@ -28,12 +28,13 @@ class Kernels:
     ----------
     step : callable
         ``(*columns, costs, margin, steps, pace, y, x, origin, share, plain, products, before, near, count, wide)
-        -> (moved, count)``: one primal step on all columns (`count` negative) or on those listed in
+        -> (moved, entered, count)``: one primal step on all columns (`count` negative) or on those listed in
         ``near[:count]``. ``steps * pace`` are the step lengths. x moves to
         ``share * (2 p - x) + (1 - share) * origin``, p the projected point, or to p where `plain`; the products
         of all 2 p - x with the columns are added to `products`. Returns the squared length of p - x in the norm
-        of the steps. A pass over all columns also lists in `near` the columns that may move before the next such
-        pass, as far as `wide` times the change of their reduced costs since the last one tells.
+        of the steps. A pass over all columns also tells how much of that is due to columns that were at rest, and
+        lists in `near` those that may move before the next such pass, as far as `wide` times the change of their
+        reduced costs since the last one tells.
     price : callable
         ``(*columns, costs, y, reduced) -> None``: reduced costs.
     collect : callable
@@ -91,6 +92,44 @@ def dual_step(
     return crossed, moved
 
 
+@compiled
+def crossed_faces(inverses: Array, beyond: Array, way: Array, faces: Array, values: Array) -> int:
+    """List the faces that a segment crosses.
+
+    Parameters
+    ----------
+    inverses : ndarray of float, shape (rows, d, d)
+        Of the matrices whose columns lead from the beginning of the segment to the vertices of a face.
+    beyond : ndarray of int8, shape (rows,)
+        0 for faces to be left out.
+    way : ndarray of float, shape (d,)
+        From the beginning of the segment to its end.
+    faces, values : ndarray, shape (rows,)
+        Receive the faces and their entries of `beyond`.
+
+    Returns
+    -------
+    count : int
+        How many there are.
+    """
+    d = way.size
+    count = 0
+    for face in range(beyond.size):
+        total = 0.0
+        inside = beyond[face] != 0
+        for i in range(d):
+            weight = 0.0
+            for j in range(d):
+                weight += inverses[face, i, j] * way[j]
+            inside = inside and weight > 0.0
+            total += weight
+        if inside and total > 1.0:
+            faces[count] = face
+            values[count] = beyond[face]
+            count += 1
+    return count
+
+
 @cache
 def kernels(width: int) -> Kernels:
     """Return the compiled passes for columns with this many fixed entries."""
@@ -104,6 +143,7 @@ def kernels(width: int) -> Kernels:
     ) -> Any:  # fmt: skip
         everything = count < 0
         moved = 0.0
+        entered = 0.0
         listed = 0
         for i in range(x.size if everything else count):
             j = i if everything else near[i]
@@ -125,11 +165,13 @@ def kernels(width: int) -> Kernels:
                     products[places[k]] += values[k] * reflected
             x[j] = new if plain else share * reflected + (1.0 - share) * origin[j]
             if everything:
+                if old == 0.0 and origin[j] == 0.0:
+                    entered += by * by / length
                 if x[j] != 0.0 or origin[j] != 0.0 or r < wide * abs(r - before[j]):
                     near[listed] = j
                     listed += 1
                 before[j] = r
-        return moved, listed
+        return moved, entered, listed
 
     @compiled
     def price(

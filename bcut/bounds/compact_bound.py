@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,9 +93,7 @@ def compact_bound(
     return CompactBound(SafeBound((start + plain) * unit_of(shift), multipliers, reduced, shift), True)
 
 
-def subtract_products(
-    program: CompactProgram, multipliers: NDArray[np.generic], reduced: NDArray[np.generic]
-) -> None:
+def subtract_products(program: CompactProgram, multipliers: NDArray[Any], reduced: NDArray[Any]) -> None:
     """Subtract the products of multipliers with all columns, in place.
 
     Parameters

@@ -13,10 +13,12 @@ combination of rows is valid: where a sign is wrong, the row helps less.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bcut.geometry.volumes import pulling_triangulation
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -24,14 +26,16 @@ if TYPE_CHECKING:
     from bcut.formulations.compact import CompactProgram
     from bcut.formulations.formulation import Formulation
 
-# As many points as repay the longer columns.
-_POINTS = 64
-# Of so many random points the most distant ones are taken.
-_CANDIDATES = 16
+# The rows lengthen the columns by so many entries on the average, but there are no more and no fewer than this.
+_ENTRIES, _FEWEST, _MOST = 0.4, 16, 512
+# Columns that tell how many simplices contain a point.
+_SAMPLE = 2000
+# Of so many random points, for each that is wanted, the most distant ones are taken.
+_CANDIDATES = 8
 
 
 def coverage_points(
-    program: CompactProgram | Formulation, *, points: int = _POINTS, seed: int = 0
+    program: CompactProgram | Formulation, *, points: int | None = None, seed: int = 0
 ) -> sp.csr_array:
     """Return combinations of rows that are coverage rows of further points.
 
@@ -39,8 +43,8 @@ def coverage_points(
     ----------
     program : CompactProgram or Formulation
         The cocircuit form. Row 0 is the coverage row of the flag of the first affinely independent points.
-    points : int
-        Their number, at most: fewer where columns would become much longer.
+    points : int, optional
+        Their number; as many as repay the longer columns if left out.
     seed : int
 
     Returns
@@ -49,23 +53,39 @@ def coverage_points(
     """
     import scipy.sparse as sp
 
+    from bcut.bounds._first_order_kernels import crossed_faces
+
+    generator = np.random.default_rng(seed)
     floats = program.configuration.floats
+    cells = floats[pulling_triangulation(program.chirotope.hull_facets, len(floats))]
+    volumes = np.abs(np.linalg.det(cells[:, 1:] - cells[:, :1]))
+    if points is None:
+        points = _number(floats, program.simplices, float(volumes.sum()), generator)
+    targets = spread_points(cells, volumes, points, generator)
     faces, apexes, signs = _faces(program)
     source = _flag_point(floats)
-    targets = spread_points(floats, points, np.random.default_rng(seed))
-    inverse, usable = _inverses(floats[faces] - source)
+    inverses, usable = _inverses(floats[faces] - source)
     # The side that the apex is on, relative to that of the source.
-    heights = np.einsum("rij,rj->ri", inverse, floats[apexes] - source).sum(axis=1)
-    beyond = np.where(heights > 1, signs, -signs)
-    rows, columns, values = [], [], []
-    for number, target in enumerate(targets):
-        weights = inverse @ (target - source)
-        crossed = np.flatnonzero(usable & (weights > 0).all(axis=1) & (weights.sum(axis=1) > 1))
-        rows.append(np.full(len(crossed) + 1, number))
-        columns.append(np.concatenate(([0], crossed + 1)))
-        values.append(np.concatenate(([1], beyond[crossed])))
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sp.csr_array(entries, shape=(len(targets), len(faces) + 1), dtype=np.int32)
+    heights = np.einsum("rij,rj->r", inverses, floats[apexes] - source)
+    beyond = np.where(usable, np.where(heights > 1, signs, -signs), 0).astype(np.int8)
+    found, values = np.empty(len(faces), dtype=np.int64), np.empty(len(faces), dtype=np.int8)
+    columns, entries, starts = [], [], [0]
+    for target in targets:
+        count = crossed_faces(inverses, beyond, target - source, found, values)
+        columns += [np.zeros(1, dtype=np.int64), found[:count] + 1]
+        entries += [np.ones(1, dtype=np.int32), values[:count].astype(np.int32)]
+        starts.append(starts[-1] + count + 1)
+    parts = (np.concatenate(entries), np.concatenate(columns), np.array(starts))
+    return sp.csr_array(parts, shape=(len(targets), len(faces) + 1))
+
+
+def _number(
+    floats: NDArray[np.float64], simplices: NDArray[Any], volume: float, generator: np.random.Generator
+) -> int:
+    """Return how many points are covered as often as wanted, if the simplices are like some of them."""
+    corners = floats[simplices[generator.integers(len(simplices), size=_SAMPLE)]]
+    share = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).mean()) / volume
+    return int(np.clip(_ENTRIES / max(share, 1e-300), _FEWEST, _MOST))
 
 
 def _faces(
@@ -119,14 +139,15 @@ def _inverses(edges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 def spread_points(
-    floats: NDArray[np.float64], count: int, generator: np.random.Generator
+    cells: NDArray[np.float64], volumes: NDArray[np.float64], count: int, generator: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Draw points of the convex hull that are far from each other.
+    """Draw points that are far from each other, uniformly before the choice.
 
     Parameters
     ----------
-    floats : ndarray of float, shape (n, d)
-        The points whose hull it is.
+    cells : ndarray of float, shape (k, d + 1, d)
+        Simplices to draw from.
+    volumes : ndarray of float, shape (k,)
     count : int
     generator : numpy.random.Generator
 
@@ -134,10 +155,6 @@ def spread_points(
     -------
     ndarray of float, shape (count, d)
     """
-    from scipy.spatial import Delaunay
-
-    cells = floats[Delaunay(floats, qhull_options="QJ Pp").simplices]
-    volumes = np.abs(np.linalg.det(cells[:, 1:] - cells[:, :1]))
     drawn = generator.choice(len(cells), size=_CANDIDATES * count, p=volumes / volumes.sum())
     weights = generator.dirichlet(np.ones(cells.shape[1]), size=len(drawn))
     candidates = np.einsum("ki,kij->kj", weights, cells[drawn])

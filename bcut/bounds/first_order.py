@@ -126,6 +126,8 @@ def first_order_bound(
     """
     run = _Run(program, anchor, incumbent, tolerance)
     status: Status = "iterations"
+    if not program.columns.count:
+        return run.result(status)
     try:
         iteration = HalpernIteration(program, run.repair, start)
         run.x = iteration.x

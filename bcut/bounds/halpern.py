@@ -26,14 +26,18 @@ from bcut.bounds.repair import Floats, Program, Repair
 _MUCH, _ENOUGH, _LONG = 0.1, 0.9, 0.36
 # How far the primal weight goes to what the last stretch suggests, on a logarithmic scale.
 _SMOOTHING = 0.5
+# Factor of the primal weight while x does not move at all.
+_FASTER = 4.0
 # Weights of columns are divided by this plus their reduced costs, relative to their costs.
-_FLOOR = 0.03
+_FLOOR = 0.005
 # Step lengths follow reduced costs from this iteration on, whenever the number of iterations has grown by this factor.
-_FIRST_REFRESH, _REFRESH = 200, 1.2
+_FIRST_REFRESH, _REFRESH = 200, 1.4
 # Share of the largest stable step length, and iterations of the power method that estimates it.
 _SAFETY, _POWER_FIRST, _POWER_AGAIN = 0.97, 25, 8
 # Passes over all columns; between them, over those that may move.
-_PERIOD, _WIDE = 10, 2.0
+_LONGEST, _WIDE = 10, 2.0
+# Passes come more often when columns at rest had too large a share in the last step.
+_SURPRISE = 0.05
 
 
 class HalpernIteration:
@@ -86,7 +90,7 @@ class HalpernIteration:
         self.weight = float(np.median(self.scale)) / program.largest_side
         self.before = np.full(count, -inf)
         self.near = np.empty(count, dtype=np.int32)
-        self.listed, self.until_pass = -1, 0
+        self.listed, self.until_pass, self.period = -1, 0, 1
         self.since_restart, self.iterations, self.refreshed = 0, 0, 0
         self.first_residual = self.last_residual = inf
         self.restart_next = False
@@ -130,7 +134,7 @@ class HalpernIteration:
         self._sums[:] = 0.0
         columns.extended(self.y, self._extended)
         everything = self.until_pass <= 0
-        moved, listed = columns.kernels.step(
+        moved, entered, listed = columns.kernels.step(
             *columns.arrays,
             self.program.costs,
             self.margin,
@@ -148,7 +152,9 @@ class HalpernIteration:
             _WIDE,
         )
         if everything:
-            self.listed, self.until_pass = listed, _PERIOD
+            late = entered > _SURPRISE * moved
+            self.period = max(1, self.period // 2) if late else min(_LONGEST, self.period + 1)
+            self.listed, self.until_pass = listed, self.period
         self.until_pass -= 1
         return float(moved)
 
@@ -171,6 +177,9 @@ class HalpernIteration:
         by_y = sqrt(float(((self.y - self.origin_y) ** 2 / self.row_steps).sum()))
         if by_x > 1e-12 and by_y > 1e-12:
             self.weight = exp(_SMOOTHING * log(by_y / by_x) + (1 - _SMOOTHING) * log(self.weight))
+        elif by_y > 1e-12:
+            # Nothing that y did has reached x yet.
+            self.weight *= _FASTER
         self.origin_x[:] = self.x
         self.origin_y[:], self.origin_products[:] = self.y, self.products
         self.since_restart, self.until_pass, self.restart_next = 0, 0, False

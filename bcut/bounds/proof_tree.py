@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
 
 _INTEGRAL = 1e-6
+# What counts as zero, or as rounding alone, relative to the largest number of its kind.
+_CLOSE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -145,9 +147,9 @@ class _Search:
         self.program.nodes += 1
         x, candidates = self._relaxed(fixed)
         for duals in candidates:
-            for multipliers in self._roundings(duals):
-                if self._bound(fixed, multipliers) > self.floor:
-                    return Leaf(tuple((row, value) for row, value in enumerate(multipliers) if value))
+            multipliers = self._settling(fixed, duals)
+            if multipliers is not None:
+                return Leaf(tuple((row, value) for row, value in enumerate(multipliers) if value))
         if x is None:
             # Multipliers that do not come out exactly; with everything fixed they do.
             column = int(np.flatnonzero(fixed == 0)[0])
@@ -211,6 +213,54 @@ class _Search:
         solution = solve_linear_program(LinearProgram(costs, both, rest.astype(float), rest.astype(float)))
         return solution.value, solution.x[:columns], solution.duals
 
+    def _settling(self, fixed: NDArray[np.int8], duals: NDArray[np.float64]) -> list[Fraction] | None:
+        """Return rational multipliers near some duals that settle a leaf; None where there seem to be none."""
+        nearest = -np.inf
+        for multipliers in self._roundings(duals):
+            bound = self._bound(fixed, multipliers)
+            if bound > self.floor:
+                return multipliers
+            nearest = max(nearest, float(bound - self.floor))
+        if nearest > -_CLOSE * self.program._scale:
+            exact = self._on_basis(fixed, duals)
+            if exact is not None and self._bound(fixed, exact) > self.floor:
+                return exact
+        return None
+
+    def _on_basis(self, fixed: NDArray[np.int8], duals: NDArray[np.float64]) -> list[Fraction] | None:
+        """Solve exactly for the duals that are not 0, with the columns whose reduced costs are.
+
+        What a bound lacks because of rounding alone, it has then.
+        """
+        import flint
+
+        program, size = self.program, np.abs(duals).max(initial=0.0)
+        if not size:
+            return None
+        rows = np.flatnonzero(np.abs(duals) > _CLOSE * size)
+        costs = np.array([float(cost) for cost in self.costs])
+        reduced = costs - duals @ program.matrix
+        tight = np.flatnonzero((fixed == 0) & (np.abs(reduced) <= _CLOSE * program._scale))
+        part = program._columns[:, tight].T.tocsr()[:, rows].toarray().tolist()
+        entries = [[*row, self.costs[column]] for row, column in zip(part, tight.tolist(), strict=True)]
+        if not entries:
+            return None
+        echelon, rank = flint.fmpq_mat(flint.fmpz_mat(entries)).rref()
+        values = [Fraction(round(value)) for value in duals[rows].tolist()]
+        table = [[Fraction(int(x.p), int(x.q)) for x in row] for row in echelon.tolist()[:rank]]
+        for row in reversed(table):
+            pivot = next(place for place, entry in enumerate(row) if entry)
+            if pivot == len(rows):
+                return None
+            rest = sum((row[k] * values[k] for k in range(pivot + 1, len(rows))), Fraction(0))
+            values[pivot] = row[-1] - rest
+        if not program.equations and any(value > 0 for value in values):
+            return None
+        result = [Fraction(0)] * len(duals)
+        for place, value in zip(rows.tolist(), values, strict=True):
+            result[place] = value
+        return result
+
     def _roundings(self, duals: NDArray[np.float64]) -> list[list[Fraction]]:
         """Return multipliers near some duals, the ones with the smallest denominators first."""
         values = duals.tolist() if self.program.equations else np.minimum(duals, 0.0).tolist()
@@ -231,6 +281,8 @@ class _Search:
         for column in np.flatnonzero(fixed >= 0).tolist():
             part = slice(columns.indptr[column], columns.indptr[column + 1])
             pairs = zip(columns.indices[part].tolist(), columns.data[part].tolist(), strict=True)
-            reduced = self.costs[column] - sum((multipliers[row] * entry for row, entry in pairs), Fraction(0))
+            reduced = self.costs[column] - sum(
+                (multipliers[row] * entry for row, entry in pairs), Fraction(0)
+            )
             total += reduced if fixed[column] == 1 else min(reduced, Fraction(0))
         return total

@@ -60,8 +60,9 @@ class Program:
         ----------
         combinations : sparse matrix, shape (k, rows)
         """
-        used = np.unique(combinations.tocsr().indices)
-        if not np.array_equal(self.lower[used], self.upper[used]):
+        used = np.zeros(self.columns.rows, dtype=bool)
+        used[combinations.tocsr().indices] = True
+        if np.any(self.lower[used] != self.upper[used]):
             raise ValueError("only equations can be combined")
         sides = combinations @ np.where(self.lower == self.upper, self.lower, 0.0)
         return Program(

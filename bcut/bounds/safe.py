@@ -151,6 +151,7 @@ def _safe_bound_with_large_rows(
 
 
 def unit_of(shift: int) -> Fraction:
+    """Return ``2**-shift``."""
     return Fraction(1, 1 << shift) if shift >= 0 else Fraction(1 << -shift)
 
 

@@ -22,6 +22,7 @@ _COMMANDS = {
         "bound",
         "verify",
         "regular",
+        "region",
         "separators",
         "objectives",
         "experiment",

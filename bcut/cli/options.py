@@ -118,6 +118,12 @@ run_options = _together(
         help="Stop after S seconds with what was found (exit status 3).",
     ),
     click.option(
+        "--memory-limit",
+        type=float,
+        metavar="GIB",
+        help="Stop when the process uses more than this, with what was found (exit status 3).",
+    ),
+    click.option(
         "--seed",
         type=int,
         default=0,

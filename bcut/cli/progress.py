@@ -56,4 +56,6 @@ class _Line:
             value = next((facts[key] for key in keys if facts.get(key) is not None), None)
             if value is not None:
                 parts.append(f"{name} {value:,.8g}" if isinstance(value, float) else f"{name} {value:,}")
+        if facts.get("memory"):
+            parts.append(f"{facts['memory'] / 2**30:.2f} GiB")
         return Text("  ".join(parts), no_wrap=True, overflow="ellipsis")

@@ -57,7 +57,8 @@ def run_in_process(task: Mapping[str, Any], stop: Callable[[], bool] = lambda: F
         place = Path(folder)
         with (place / "messages").open("wb") as messages:
             process = subprocess.Popen(
-                [sys.executable, "-m", "bcut.experiments.execute", folder],
+                # Without the current folder among the places of modules: whatever lies there is not meant.
+                [sys.executable, "-P", "-m", "bcut.experiments.execute", folder],
                 stdin=subprocess.PIPE,
                 stdout=messages,
                 stderr=messages,

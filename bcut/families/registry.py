@@ -11,6 +11,7 @@ from bcut.errors import ConfigurationError, InputError
 from bcut.families import combinatorial, polygons, random_points
 from bcut.families.parameters import Parameters
 from bcut.families.solids import SOLIDS, solid
+from bcut.families.surfaces import points_of
 from bcut.geometry.configuration import PointConfiguration
 
 
@@ -93,6 +94,27 @@ _FAMILIES = [
         "sphere:30,3,seed=7",
         "N points in uniform directions on the unit sphere in dimension D",
         random_points.on_sphere,
+    ),
+    Family(
+        "schoenhardt",
+        "schoenhardt",
+        "schoenhardt",
+        "Schönhardt's polyhedron (bcut region): points of a twisted triangular prism",
+        points_of("schoenhardt"),
+    ),
+    Family(
+        "twisted-prism",
+        "twisted-prism:M[,twist=T][,seed=S]",
+        "twisted-prism:5,twist=18,seed=3",
+        "prism with concave sides (bcut region), turned by T degrees, irregular with a seed other than 0",
+        points_of("twisted-prism"),
+    ),
+    Family(
+        "chazelle",
+        "chazelle:K",
+        "chazelle:2",
+        "box with K notches from each of two sides (bcut region) along a saddle",
+        points_of("chazelle"),
     ),
     *[Family(name, name, name, description, solid(name)) for name, (description, _) in SOLIDS.items()],
 ]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -83,9 +84,9 @@ def chazelle(parameters: Parameters) -> Surface:
         upper.append((len(points), len(points) + 1))
         points += [[x, y, x * y + 1 if notch else high] for x in (-size, size)]
     faces: list[list[int]] = []
-    for (a, b), (c, d) in zip(lower, lower[1:], strict=False):
+    for (a, b), (c, d) in pairwise(lower):
         faces += [[a, b, c], [b, d, c]]
-    for (a, b), (c, d) in zip(upper, upper[1:], strict=False):
+    for (a, b), (c, d) in pairwise(upper):
         faces += [[a, b, d], [a, d, c]]
     # The four sides: two have the zigzag of the lower side at their bottom, two that of the upper side at their top.
     (sw, nw), (se, ne) = lower[0], lower[-1]

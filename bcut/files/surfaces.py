@@ -99,8 +99,8 @@ def _mesh_faces(path: Path, kind: str) -> list[list[int]]:
     declared = _declared_faces(content, kind)
     if faces.shape[1:] != (3,) or (declared is not None and declared != len(faces)):
         raise InputError(
-            f"{path}: the file has {declared} faces, which are not all triangles; divide them into triangles, since how "
-            "they are divided matters"
+            f"{path}: the file has {declared} faces, which are not all triangles; divide them into triangles, "
+            "since how they are divided matters"
         )
     return [[int(vertex) for vertex in face] for face in faces]
 

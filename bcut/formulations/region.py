@@ -5,9 +5,9 @@ many on the one side as on the other. Then the number of chosen tetrahedra over 
 one across each surface triangle, and changes nowhere else: it is 1 inside. So the 0/1 points are exactly the
 triangulations of the region with the surface's triangles as boundary faces.
 
-**As much as possible.** Tetrahedra of which no two cross, so that together with the surface they are a simplicial complex, of
-the largest volume (the paper, Sec. 5): a stable set problem. Its rows are cliques: tetrahedra on one side of a triangle, those
-over one generic point, and enough others that every pair that crosses is in one.
+**As much as possible.** Tetrahedra of which no two cross, so that together with the surface they are a simplicial
+complex, of the largest volume (the paper, Sec. 5): a stable set problem. Its rows are cliques: tetrahedra on one side
+of a triangle, those over one generic point, and enough others that every pair that crosses is in one.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""Compiled loops of `bcut.geometry.elimination`: what floating point decides, and lists of what it does not.
+"""Compiled loops of `bcut.geometry.elimination`, but for the diamond test and the tilings.
 
-Points are doubles of shape (n, 2), in units in which differences do not exceed 2 (or are small integers), with one error
-`delta` for all coordinates: a coordinate is off by at most that. Zero says that coordinates are exact, so that a difference is
-rounded once; a negative `delta` says that they are integers small enough for every operation here to be exact.
+They decide what floating point can decide, and list the rest. Points are doubles of shape (n, 2), in units in which
+differences do not exceed 2 (or are small integers), with one error `delta` for all coordinates: a coordinate is off
+by at most that. Zero says that coordinates are exact, so that a difference is rounded once; a negative `delta` says
+that they are integers small enough for every operation here to be exact.
 
 The kernels of this file stand together because numba's cache on disk watches the file of a kernel only.
 """
 
 from __future__ import annotations
 
-from math import floor, pi, sqrt
 from typing import Any
 
 import numba
@@ -26,12 +26,7 @@ UNDECIDED = 2
 _ROUNDINGS = 2.0**-50
 # Absorbs products that underflow.
 _TINY = 1e-290
-# Directions around a point, in steps, and how much of a step's neighbourhood blockers have to cover as well.
-_DIRECTIONS = 256
-_STEP = 2 * pi / _DIRECTIONS
-_MARGIN = 1e-6
-# Nearer points than so many errors have no reliable direction.
-_RELIABLE = 1e8
+# Boxes in a leaf of a tree.
 _LEAF = 8
 
 
@@ -71,176 +66,6 @@ def _is_longer(points: Array, a: int, b: int, c: int, d: int, delta: float) -> b
     first, second = ux * ux + uy * uy, vx * vx + vy * vy
     error = _error(first, second, 2 * (abs(ux) + abs(uy) + abs(vx) + abs(vy)), delta)
     return first - second > 2 * error
-
-
-# ---------------------------------------------------------------------------------------------- the diamond test
-
-
-@numba.njit
-def _half_of_diamond(points: Array, p: int, q: int, r: int, tangent: float, delta: float) -> int:
-    """Return 1 or -1 where r is proven to be inside the triangle to the left or right of the base p q, else 0."""
-    ux, uy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
-    vx, vy = points[r, 0] - points[p, 0], points[r, 1] - points[p, 1]
-    height, along, whole = ux * vy - uy * vx, ux * vx + uy * vy, ux * ux + uy * uy
-    sizes = 2 * (abs(ux) + abs(uy)) + abs(vx) + abs(vy)
-    products = (abs(ux) + abs(uy)) * (abs(vx) + abs(vy)) + whole
-    # Generous also for small integers: only proven insides count, and a boundary is no inside.
-    error = 4 * _error(products, products, sizes, max(delta, 0.0))
-    if along <= error or whole - along <= error:
-        return 0
-    side = 1 if height > 0 else -1
-    height = abs(height)
-    if height <= error or height + error >= tangent * (along - error):
-        return 0
-    return side if height + error < tangent * (whole - along - error) else 0
-
-
-@numba.njit
-def _is_excluded(points: Array, p: int, q: int, near: Array, count: int, tangent: float, delta: float) -> int:
-    """Return which halves of the diamond over p q contain some of the first points near p: bits 1 (left) and 2."""
-    halves = 0
-    for k in range(count):
-        if near[k] != q and near[k] != p:
-            side = _half_of_diamond(points, p, q, near[k], tangent, delta)
-            if side != 0:
-                halves |= 1 if side > 0 else 2
-                if halves == 3:
-                    break
-    return halves
-
-
-@numba.njit
-def _block(limits: Array, angle: float, reach: float, base: float) -> None:
-    """Note that bases which begin here are excluded on one side beyond a length, in some directions.
-
-    A point r at direction `angle` and distance ``reach / (2 cos(base))`` lies in the left half of the diamond over every
-    base that is longer than `reach` and has a direction between ``angle - base`` and `angle`; and likewise on the right.
-    """
-    first = int(np.ceil((angle - base + _MARGIN) / _STEP))
-    last = int(floor((angle - _MARGIN) / _STEP))
-    for k in range(first, last):
-        direction = k % _DIRECTIONS
-        limits[direction, 0] = min(limits[direction, 0], reach)
-    first = int(np.ceil((angle + _MARGIN) / _STEP))
-    last = int(floor((angle + base - _MARGIN) / _STEP))
-    for k in range(first, last):
-        direction = k % _DIRECTIONS
-        limits[direction, 1] = min(limits[direction, 1], reach)
-
-
-@numba.njit
-def _direction(angle: float) -> int:
-    return int(floor(angle / _STEP)) % _DIRECTIONS
-
-
-@compiled
-def near_diamonds(
-    points: Array, delta: float, who: Array, neighbours: Array, everyone: bool, base: float, limits: Array,
-    finished: Array, codes: Array,
-) -> int:  # fmt: skip
-    """Find the edges that pass the diamond test, for points whose neighbours settle it.
-
-    Parameters
-    ----------
-    points, delta
-    who : ndarray of int64, shape (k,)
-        The points in question.
-    neighbours : ndarray of int64, shape (k, c)
-        Points near each of them, by distance, themselves included.
-    everyone : bool
-        Whether the neighbours are all points.
-    base : float
-        Angle at the base of the two triangles.
-    limits : ndarray of float64, shape (k, directions, 2)
-        Filled: from which length on edges in a direction are excluded on the left and on the right.
-    finished : ndarray of bool, shape (k,)
-        Filled: whether no point that is farther away than the neighbours can be joined to this one.
-    codes : ndarray of int64, shape (k * c,)
-        Filled with ``a * n + b`` for each edge a < b of the finished points.
-
-    Returns
-    -------
-    int
-        The number of codes.
-    """
-    n, tangent, stretch = len(points), np.tan(base), 2 * np.cos(base) * (1 + _MARGIN)
-    count = 0
-    for i in range(len(who)):
-        p, start = who[i], count
-        limits[i] = np.inf
-        finished[i] = everyone
-        longest = np.inf
-        for j in range(neighbours.shape[1]):
-            q = neighbours[i, j]
-            if q == p:
-                continue
-            dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
-            distance = sqrt(dx * dx + dy * dy)
-            if distance > longest:
-                finished[i] = True
-                break
-            angle = np.arctan2(dy, dx)
-            here = limits[i, _direction(angle)]
-            passes = here[0] >= distance or here[1] >= distance
-            if passes and _is_excluded(points, p, q, neighbours[i], j, tangent, delta) != 3:
-                codes[count] = min(p, q) * n + max(p, q)
-                count += 1
-            if distance > _RELIABLE * delta:
-                _block(limits[i], angle, distance * stretch, base)
-                if j % 4 == 3:
-                    longest = limits[i].max()
-        if not finished[i]:
-            count = start
-    return count
-
-
-@compiled
-def far_diamonds(
-    points: Array, delta: float, who: Array, neighbours: Array, base: float, limits: Array, codes: Array
-) -> int:
-    """Find the edges between points that `near_diamonds` did not finish.
-
-    Parameters
-    ----------
-    points, delta, who, neighbours, base, limits
-        As `near_diamonds` left them.
-    codes : ndarray of int64
-        Filled as far as there is room.
-
-    Returns
-    -------
-    int
-        The number of codes that there are.
-    """
-    n, tangent, count = len(points), np.tan(base), 0
-    known = neighbours.shape[1]
-    for i in range(len(who)):
-        for j in range(i + 1, len(who)):
-            p, q = who[i], who[j]
-            dx, dy = points[q, 0] - points[p, 0], points[q, 1] - points[p, 1]
-            distance = sqrt(dx * dx + dy * dy)
-            halves = 0
-            if distance > _RELIABLE * delta:
-                angle = np.arctan2(dy, dx)
-                there, back = limits[i, _direction(angle)], limits[j, _direction(angle + pi)]
-                # Left and right change places when one looks back.
-                if there[0] < distance or back[1] < distance:
-                    halves |= 1
-                if there[1] < distance or back[0] < distance:
-                    halves |= 2
-            if halves != 3:
-                halves |= _is_excluded(points, p, q, neighbours[i], known, tangent, delta)
-            if halves != 3:
-                turned = _is_excluded(points, q, p, neighbours[j], known, tangent, delta)
-                halves |= (turned & 1) << 1 | turned >> 1
-            if halves != 3:
-                if count < len(codes):
-                    codes[count] = min(p, q) * n + max(p, q)
-                count += 1
-    return count
-
-
-# ------------------------------------------------------------------------------------------- a tree of boxes
 
 
 @compiled
@@ -393,7 +218,7 @@ def find_points_inside(
                 size += 2
                 continue
             for p in order[ranges[node, 0] : ranges[node, 1]]:
-                if p == a or p == b or p == c:
+                if p in (a, b, c):
                     continue
                 first = _orientation(points, a, b, p, delta)
                 second = _orientation(points, b, c, p, delta)
@@ -485,11 +310,20 @@ def _has_certificate(
     return False
 
 
+@numba.njit
+def _root(parents: Array, e: int) -> int:
+    while parents[e] != e:
+        parents[e] = parents[parents[e]]
+        e = parents[e]
+    return e
+
+
 @compiled
 def find_crossings(
-    points: Array, delta: float, edges: Array, order: Array, boxes: Array, ranges: Array, pairs: Array
-) -> int:
-    """List pairs of edges that are not proven not to cross.
+    points: Array, delta: float, edges: Array, order: Array, boxes: Array, ranges: Array, parents: Array,
+    crossed: Array, doubts: Array,
+) -> int:  # fmt: skip
+    """Tell which edges are crossed, and group those that cross, directly or through others.
 
     Parameters
     ----------
@@ -498,13 +332,17 @@ def find_crossings(
         None has a further point on it.
     order, boxes, ranges
         The tree of the edges' boxes.
-    pairs : ndarray of int64, shape (k, 2)
-        Filled as far as there is room.
+    parents : ndarray of int64, shape (m,)
+        0 ... m - 1; filled with a forest of the groups.
+    crossed : ndarray of bool, shape (m,)
+        Filled.
+    doubts : ndarray of int64, shape (k, 2)
+        Filled as far as there is room: pairs that may cross, and would tell something new.
 
     Returns
     -------
     int
-        The number of pairs that there are.
+        The number of doubts that there are.
     """
     stack, count = np.empty(256, np.int64), 0
     slack = 4 * max(delta, 0.0)
@@ -512,7 +350,7 @@ def find_crossings(
         a, b = edges[e, 0], edges[e, 1]
         left, right = min(points[a, 0], points[b, 0]) - slack, max(points[a, 0], points[b, 0]) + slack
         bottom, top = min(points[a, 1], points[b, 1]) - slack, max(points[a, 1], points[b, 1]) + slack
-        size, stack[0] = 1, 0
+        size, stack[0], group = 1, 0, _root(parents, e)
         while size > 0:
             size -= 1
             node = stack[size]
@@ -526,120 +364,34 @@ def find_crossings(
                 size += 2
                 continue
             for other in order[ranges[node, 0] : ranges[node, 1]]:
-                if other > e and _may_cross(points, a, b, edges[other, 0], edges[other, 1], delta):
-                    if count < len(pairs):
-                        pairs[count, 0], pairs[count, 1] = e, other
+                # Edges of one group of two or more are crossed.
+                theirs = _root(parents, other) if other > e else group
+                if theirs == group:
+                    continue
+                answer = _crossing(points, a, b, edges[other, 0], edges[other, 1], delta)
+                if answer == 1:
+                    crossed[e] = crossed[other] = True
+                    parents[theirs] = group
+                elif answer == UNDECIDED:
+                    if count < len(doubts):
+                        doubts[count, 0], doubts[count, 1] = e, other
                     count += 1
     return count
 
 
 @numba.njit
-def _may_cross(points: Array, a: int, b: int, c: int, d: int, delta: float) -> bool:
-    if a == c or a == d or b == c or b == d:
-        return False
-    return not (
-        _are_on_one_side(points, a, b, c, d, delta) or _are_on_one_side(points, c, d, a, b, delta)
-    )
+def _crossing(points: Array, a: int, b: int, c: int, d: int, delta: float) -> int:
+    """Return 1 where two segments cross, 0 where they do not, or `UNDECIDED`."""
+    if a in (c, d) or b in (c, d):
+        return 0
+    one, other = _opposite_sides(points, a, b, c, d, delta), _opposite_sides(points, c, d, a, b, delta)
+    return one if one == 0 or other == 1 else other
 
 
 @numba.njit
-def _are_on_one_side(points: Array, a: int, b: int, c: int, d: int, delta: float) -> bool:
-    """Tell whether c and d are proven not to be on opposite sides of the line from a to b."""
+def _opposite_sides(points: Array, a: int, b: int, c: int, d: int, delta: float) -> int:
+    """Return 1 where c and d are on opposite sides of the line from a to b, 0 where they are not, or `UNDECIDED`."""
     first, second = _orientation(points, a, b, c, delta), _orientation(points, a, b, d, delta)
-    return first != UNDECIDED and second != UNDECIDED and first * second >= 0
-
-
-# ---------------------------------------------------------------------------------------------- dynamic programming
-
-
-@compiled
-def best_tilings(
-    roots: Array, costs: Array, edge_sides: Array, starts: Array, members: Array, is_wall: Array, values: Array,
-    chosen: Array,
-) -> int:  # fmt: skip
-    """Tile simply connected faces by triangles of least cost.
-
-    Parameters
-    ----------
-    roots : ndarray of int64, shape (f,)
-        A side of an edge on the boundary of each face.
-    costs : ndarray of float64, shape (t,)
-    edge_sides, starts, members
-        As for `keep_locally_minimal`, of the triangles that may be used.
-    is_wall : ndarray of bool, shape (m,)
-        Which edges are in the boundary of faces.
-    values : ndarray of float64, shape (f,)
-        Filled with the costs of the tilings; infinite where there is none.
-    chosen : ndarray of int64, shape (t,)
-        Filled with the triangles.
-
-    Returns
-    -------
-    int
-        The number of triangles, or -1 where a face is not simply connected.
-    """
-    sides = len(starts) - 1
-    best, value = np.full(sides, -1, np.int64), np.full(sides, np.nan)
-    cursor, opened = starts[:-1].copy(), np.zeros(sides, np.bool_)
-    stack, count = np.empty(sides + 3, np.int64), 0
-    for f in range(len(roots)):
-        size, stack[0] = 1, roots[f]
-        while size > 0:
-            side = stack[size - 1]
-            if not np.isnan(value[side]):
-                size -= 1
-                continue
-            opened[side] = True
-            waiting = False
-            while cursor[side] < starts[side + 1] and not waiting:
-                t = members[cursor[side]] // 3
-                for position in range(3):
-                    beyond = edge_sides[t, position] ^ 1
-                    if beyond == side ^ 1 or is_wall[beyond // 2] or not np.isnan(value[beyond]):
-                        continue
-                    if opened[beyond]:
-                        return -1
-                    waiting = True
-                    stack[size] = beyond
-                    size += 1
-                    break
-                if not waiting:
-                    cursor[side] += 1
-            if not waiting:
-                value[side], best[side] = _best_triangle(
-                    side, costs, edge_sides, starts, members, is_wall, value
-                )
-                opened[side] = False
-        values[f] = value[roots[f]]
-        if values[f] == np.inf:
-            continue
-        size, stack[0] = 1, roots[f]
-        while size > 0:
-            size -= 1
-            side = stack[size]
-            chosen[count] = best[side]
-            for position in range(3):
-                beyond = edge_sides[chosen[count], position] ^ 1
-                if beyond != side ^ 1 and not is_wall[beyond // 2]:
-                    stack[size] = beyond
-                    size += 1
-            count += 1
-    return count
-
-
-@numba.njit
-def _best_triangle(
-    side: int, costs: Array, edge_sides: Array, starts: Array, members: Array, is_wall: Array, value: Array
-) -> tuple[float, int]:
-    """Return the least cost of what lies on a side of an edge, and the triangle next to the edge."""
-    least, best = np.inf, -1
-    for k in range(starts[side], starts[side + 1]):
-        t = members[k] // 3
-        total = costs[t]
-        for position in range(3):
-            beyond = edge_sides[t, position] ^ 1
-            if beyond != side ^ 1 and not is_wall[beyond // 2]:
-                total += value[beyond]
-        if total < least:
-            least, best = total, t
-    return least, best
+    if first == UNDECIDED or second == UNDECIDED:
+        return UNDECIDED
+    return 1 if first * second < 0 else 0

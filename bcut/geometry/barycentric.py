@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from bcut.geometry.chirotope import Chirotope
 
 
-def barycentric_signs(
-    chirotope: Chirotope, simplices: NDArray[np.integer], point: int
-) -> NDArray[np.int8]:
+def barycentric_signs(chirotope: Chirotope, simplices: NDArray[np.integer], point: int) -> NDArray[np.int8]:
     """Return the signs of the barycentric coordinates of a point in simplices, shape (k, d + 1).
 
     Parameters

@@ -1,39 +1,40 @@
 r"""Edges that a minimum weight triangulation of the plane can have: theorems, without any linear program.
 
-The weight of a triangulation is the sum of the lengths of its edges; all points are used. Below, S is the set of points,
-an *edge* joins two points of S and contains no third one, and a triangle is *empty* if it contains no point of S but its
-vertices. Two theorems take edges away.
+The weight of a triangulation is the sum of the lengths of its edges; all points are used. Below, S is the set of
+points, an *edge* joins two points of S and contains no third one, and a triangle is *empty* if it contains no point
+of S but its vertices. Two theorems take edges away.
 
-**The diamond test.** Let pq be an edge of a minimum weight triangulation. Then at least one of the two isosceles triangles
-with base pq and base angle pi/4.6 has no point of S in its interior. (G. Das and D. Joseph, "Which triangulations approximate
-the complete graph?", 1989, with pi/8; R. Drysdale, S. McElfresh and J. Snoeyink, "On exclusion regions for optimal
-triangulations", Discrete Applied Mathematics 109, 2001, for pi/4.6.) How it is proven: if there are points on both sides,
-take away the edges that cross the segment between two of them, suitably chosen. What appears is a polygon with as many
-diagonals in any other triangulation. All edges taken away have to pass through the waist of the diamond and are long; put back
-are that segment and diagonals on either side of it, and the base angle is just what makes these shorter in sum. Edges of the
-hull pass: one of their triangles lies outside.
+**The diamond test.** Let pq be an edge of a minimum weight triangulation. Then at least one of the two isosceles
+triangles with base pq and base angle pi/4.6 has no point of S in its interior. (G. Das and D. Joseph, "Which
+triangulations approximate the complete graph?", 1989, with pi/8; R. Drysdale, S. McElfresh and J. Snoeyink, "On
+exclusion regions for optimal triangulations", Discrete Applied Mathematics 109, 2001, for pi/4.6.) The proof
+is an exchange: with a point on either side near enough, the edges that separate two such points can be replaced by a
+segment between these and as many diagonals in all, of a smaller sum; the base angle is what the estimates there need.
+Edges of the hull pass: one of their triangles lies outside. We take the theorem as it was published, for finite sets
+of points. Nothing else here depends on it: `lmt_skeleton` can begin with `all_pairs`.
 
-**Local minimality.** Let e be an edge of a minimum weight triangulation, not in the boundary of the hull, and t, t' the two
-triangles at it. Where their union is strictly convex, e is not longer than the other diagonal f: f contains no further point,
-since t and t' are empty, so f for e makes another triangulation, of smaller weight if f were shorter. So where a set E of edges is known
-to contain all edges of a minimum weight triangulation, e must be *locally minimal* in the union of some pair of empty
-triangles with edges in E; otherwise it is struck out of E, and E is smaller for the next edge. Now let e in E be crossed
-by no other edge of E. A triangulation is a maximal set of edges without crossings, so every one with edges in E has e: it
-is *certain*. The certain edges are the LMT-skeleton (M. Dickerson and M. Montague, "A (usually?) connected subgraph of the
-minimum weight triangulation", SoCG 1996; P. Belleville, M. Keil, M. McAllister and J. Snoeyink, "On computing edges that
-are in all minimum-weight triangulations", 1996; R. Beirouti and J. Snoeyink, "Implementations of the LMT heuristic for
-minimum weight triangulation", SoCG 1998). With the diamond test before it, it solves instances of millions of points (A. Haas,
-"Solving large-scale minimum-weight triangulation instances to provable optimality", SoCG 2018). This argument needs no general
-position: points may be collinear or cocircular.
+**Local minimality.** Let e be an edge of a minimum weight triangulation, not in the boundary of the hull, and t, t'
+the two triangles at it. Where their union is strictly convex, e is not longer than the other diagonal f: f contains
+no further point, since t and t' are empty, so f for e makes another triangulation, of smaller weight if f were
+shorter. So where a set E of edges is known to contain all edges of a minimum weight triangulation, e must be *locally
+minimal* in the union of some pair of empty triangles with edges in E; otherwise it is struck out of E, and E is
+smaller for the next edge. Now let e in E be crossed by no other edge of E. A triangulation is a maximal set of edges
+without crossings, so every one with edges in E has e: it is *certain*. The certain edges are the LMT-skeleton (M.
+Dickerson and M. Montague, "A (usually?) connected subgraph of the minimum weight triangulation", SoCG 1996; P.
+Belleville, M. Keil, M. McAllister and J. Snoeyink, "On computing edges that are in all minimum-weight
+triangulations", 1996; R. Beirouti and J. Snoeyink, "Implementations of the LMT heuristic for minimum weight
+triangulation", SoCG 1998). With the diamond test before it, it solves instances of millions of points (A. Haas,
+"Solving large-scale minimum-weight triangulation instances to provable optimality", SoCG 2018). This argument needs
+no general position: points may be collinear or cocircular.
 
-**Faces.** Every triangulation with edges in E contains the certain ones, so it triangulates each face of the plane graph of
-these by itself, and the faces are independent problems. A face whose boundary is connected is an open disk. Each further
-edge of E in it cuts it into two disks, and the least weight on one side of the edge is a recursion over the triangles there:
-dynamic programming (P. Gilbert, 1979; G. Klincsek, "Minimal triangulations of polygonal domains", 1980). Others, such as
-faces with isolated points, are small set-partitioning programs.
+**Faces.** Every triangulation with edges in E contains the certain ones, so it triangulates each face of the plane
+graph of these by itself, and the faces are independent problems. A face whose boundary is connected is an open disk.
+Each further edge of E in it cuts it into two disks, and the least weight on one side of the edge is a recursion over
+the triangles there: dynamic programming (P. Gilbert, 1979; G. Klincsek, "Minimal triangulations of polygonal
+domains", 1980). Others, such as faces with isolated points, are small set-partitioning programs.
 
-What is decided here by floating point is decided on the safe side: an edge is struck out only where the inequality is proven
-with all rounding errors, so ties and near-ties stay. Which triangles are empty is decided exactly.
+What is decided here by floating point is decided on the safe side: an edge is struck out only where the inequality is
+proven with all rounding errors, so ties and near-ties stay. Which triangles are empty is decided exactly.
 """
 
 from __future__ import annotations
@@ -58,8 +59,7 @@ BASE_ANGLE = pi / 4.6 * (1 - 1e-9)
 # Neighbours that are looked at first, and those for points that they do not settle.
 _NEIGHBOURS, _MORE_NEIGHBOURS = 48, 256
 # Edges and triangles of this many points on a circle, say, no longer fit.
-_MOST_EDGES, _MOST_TRIANGLES = 20_000_000, 60_000_000
-_DIRECTIONS = 256
+_MOST_EDGES, _MOST_TRIANGLES = 10_000_000, 20_000_000
 
 
 def diamond_edges(configuration: PointConfiguration) -> NDArray[np.int64]:
@@ -85,18 +85,22 @@ def diamond_edges(configuration: PointConfiguration) -> NDArray[np.int64]:
     """
     from scipy.spatial import cKDTree
 
-    from bcut.geometry import _elimination_kernels as kernels
+    from bcut.geometry import _diamond_kernels as kernels
 
     _check_plane(configuration)
     n, plane = configuration.n, PlanePoints.of(configuration)
     points, delta = plane.points, plane.delta
     tree = cKDTree(points)
     found: list[NDArray[np.int64]] = []
-    who = np.arange(n)
-    for count in (_NEIGHBOURS, _MORE_NEIGHBOURS):
-        count = min(count, n)
+    who, neighbours, limits = (
+        np.arange(n),
+        np.empty((n, 0), dtype=np.int64),
+        np.empty((n, kernels.DIRECTIONS, 2)),
+    )
+    for wanted in (_NEIGHBOURS, _MORE_NEIGHBOURS):
+        count = min(wanted, n)
         neighbours = tree.query(points[who], count)[1].astype(np.int64).reshape(len(who), count)
-        limits = np.empty((len(who), _DIRECTIONS, 2))
+        limits = np.empty((len(who), kernels.DIRECTIONS, 2))
         finished, codes = np.empty(len(who), dtype=bool), np.empty(len(who) * count, dtype=np.int64)
         size = kernels.near_diamonds(
             points, delta, who, neighbours, count == n, BASE_ANGLE, limits, finished, codes
@@ -105,18 +109,20 @@ def diamond_edges(configuration: PointConfiguration) -> NDArray[np.int64]:
         who, neighbours, limits = who[~finished], neighbours[~finished], limits[~finished]
         if not len(who):
             break
-    else:
-        codes = _filled(
-            lambda room: kernels.far_diamonds(
-                points, delta, who, neighbours, BASE_ANGLE, limits, room
-            ),
-            room=1 << 16,
-            most=_MOST_EDGES,
-            what=f"{configuration.name}: edges that may be in a minimum weight triangulation",
-        )
-        found.append(codes)
-    unique = np.unique(np.concatenate(found))
-    return np.stack((unique // n, unique % n), axis=1)
+
+    def far(room: NDArray[np.int64]) -> int:
+        return int(kernels.far_diamonds(points, delta, who, neighbours, BASE_ANGLE, limits, room))
+
+    what = f"{configuration.name}: edges that may be in a minimum weight triangulation"
+    found.append(_filled(far, room=1 << 20, most=_MOST_EDGES, what=what))
+    codes = np.unique(np.concatenate(found))
+    return np.stack((codes // n, codes % n), axis=1)
+
+
+def all_pairs(configuration: PointConfiguration) -> NDArray[np.int64]:
+    """Return all pairs of points, shape (n (n - 1) / 2, 2): what is left without a diamond test."""
+    _check_plane(configuration)
+    return np.stack(np.triu_indices(configuration.n, 1), axis=1).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +139,8 @@ class Skeleton:
         All empty triangles with edges in `possible`; ascending vertices, in colexicographic order.
     edge_sides : ndarray of int64, shape (t, 3)
         Twice the number of the edge opposite to each vertex, plus 1 where the triangle lies to its right.
-    crossings : ndarray of int64, shape (k, 2)
-        Pairs of possible edges that cross. Where it was not decided whether they do, they are among these.
+    crossing_group : ndarray of int64, shape (m,)
+        The same number for edges that cross, directly or through others.
     triangles_before : int
         The number of empty triangles before edges were struck out.
     """
@@ -143,7 +149,7 @@ class Skeleton:
     is_certain: NDArray[np.bool_]
     triangles: NDArray[np.int64]
     edge_sides: NDArray[np.int64]
-    crossings: NDArray[np.int64]
+    crossing_group: NDArray[np.int64]
     triangles_before: int
 
     @property
@@ -170,25 +176,26 @@ class Skeleton:
         -----
         Triangles with a common uncertain edge lie in the same face, and so do triangles with edges that cross. All
         triangles of a face are connected in this way: let T be a triangulation with edges in E. Its triangles in the
-        face are connected across its edges there. A further triangle has an uncertain edge in the face, which is in T or
-        crosses an edge of T.
+        face are connected across its edges there. A further triangle has an uncertain edge in the face, which is in T
+        or crosses an edge of T.
         """
         import scipy.sparse as sp
         from scipy.sparse.csgraph import connected_components
 
         t, edges = len(self.triangles), self.edge_sides // 2
         row, position = np.nonzero(~self.is_certain[edges])
-        # One graph of triangles and edges.
-        first = np.concatenate((row, t + self.crossings[:, 0]))
-        second = np.concatenate((t + edges[row, position], t + self.crossings[:, 1]))
+        # One graph of triangles and groups of edges.
+        column = t + self.crossing_group[edges[row, position]]
         size = t + len(self.possible)
-        graph = sp.coo_matrix((np.ones(len(first), dtype=np.int8), (first, second)), shape=(size, size))
+        graph = sp.coo_matrix((np.ones(len(row), dtype=np.int8), (row, column)), shape=(size, size))
         labels = connected_components(graph, directed=False)[1][:t]
         faces, face_of = np.unique(labels, return_inverse=True)
         return len(faces), face_of.reshape(-1).astype(np.int64)
 
 
-def lmt_skeleton(configuration: PointConfiguration, edges: NDArray[np.integer[Any]] | None = None) -> Skeleton:
+def lmt_skeleton(
+    configuration: PointConfiguration, edges: NDArray[np.integer[Any]] | None = None
+) -> Skeleton:
     """Strike out edges that are in no locally minimal triangulation, and tell which of the rest are certain.
 
     Parameters
@@ -224,10 +231,8 @@ def lmt_skeleton(configuration: PointConfiguration, edges: NDArray[np.integer[An
     number = np.cumsum(edge_lives) - 1
     kept = 2 * number[edge_sides[lives] // 2] + edge_sides[lives] % 2
     possible = given[edge_lives]
-    crossings = _crossings(plane, possible)
-    is_certain = np.ones(len(possible), dtype=bool)
-    is_certain[crossings.reshape(-1)] = False
-    return Skeleton(possible, is_certain, triangles[lives], kept, crossings, len(triangles))
+    crossed, groups = _crossing_groups(configuration, plane, possible)
+    return Skeleton(possible, ~crossed, triangles[lives], kept, groups, len(triangles))
 
 
 def triangles_by_side(
@@ -311,18 +316,39 @@ def _lie_inside(
     return inside
 
 
-def _crossings(plane: PlanePoints, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+def _crossing_groups(
+    configuration: PointConfiguration, plane: PlanePoints, edges: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Tell exactly which edges are crossed, and number the groups of edges that cross, directly or through others."""
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
     from bcut.geometry import _elimination_kernels as kernels
 
-    ends = plane.points[edges]
+    m, ends = len(edges), plane.points[edges]
     tree = _tree(ends.min(axis=1), ends.max(axis=1))
-    return _filled(
-        lambda room: kernels.find_crossings(plane.points, plane.delta, edges, *tree, room),
+    crossed, parents = np.zeros(m, dtype=bool), np.arange(m)
+    pairs = _filled(
+        lambda room: kernels.find_crossings(plane.points, plane.delta, edges, *tree, parents, crossed, room),
         room=1 << 16,
         most=_MOST_TRIANGLES,
-        what="crossings of edges that are left",
+        what=f"{configuration.name}: edges that nearly touch",
         width=2,
     )
+    one, other = edges[pairs[:, 0]], edges[pairs[:, 1]]
+    cross = np.ones(len(pairs), dtype=bool)
+    for line, far in ((one, other), (other, one)):
+        sides = [
+            orientation_signs(configuration, np.concatenate((line, far[:, [k]]), axis=1)) for k in range(2)
+        ]
+        cross &= sides[0] * sides[1] < 0
+    crossed[pairs[cross].reshape(-1)] = True
+    first, second = (
+        np.concatenate((np.arange(m), pairs[cross, 0])),
+        np.concatenate((parents, pairs[cross, 1])),
+    )
+    graph = sp.coo_matrix((np.ones(len(first), dtype=np.int8), (first, second)), shape=(m, m))
+    return crossed, connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _tree(
@@ -346,7 +372,7 @@ def _filled(fill: Any, *, room: int, most: int, what: str, width: int = 0) -> ND
         raise _too_large(what, count, most)
     if count > room:
         found = np.empty((count, *shape), dtype=np.int64)
-        fill(found)
+        count = fill(found)
     return found[:count]
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.subsets import ranks, without
 
 #: Costs of ascending simplices, shape (k, d + 1) to (k,); infinite for those that must not be used.
-CostsOf = Callable[[NDArray[np.int64]], NDArray[np.float64]]
+CostsOf = Callable[[NDArray[np.integer]], NDArray[np.float64]]
 
 # Gains below this part of the largest cost are rounding errors.
 _TINY = 1e-12
@@ -72,6 +73,54 @@ def improve_by_flips(
             break
         state.apply(chosen)
     return state.simplices
+
+
+def anneal_by_flips(
+    simplices: NDArray[np.integer],
+    chirotope: Chirotope,
+    costs_of: CostsOf,
+    guide_of: CostsOf,
+    noise_of: Callable[[NDArray[np.integer], int], NDArray[np.float64]],
+    *,
+    spanning: bool,
+    steps: int,
+    enough: float = -inf,
+    deadline: float | None = None,
+) -> NDArray[np.int64]:
+    """Leave local minima: descend again and again with disturbed costs, the less disturbed the later.
+
+    Parameters
+    ----------
+    simplices, chirotope, costs_of, spanning, deadline
+        As for `improve_by_flips`.
+    guide_of : callable
+        Costs that lead to good triangulations better than the true ones do, such as roots of reduced costs.
+    noise_of : callable
+        Numbers of random sign for simplices in a step, about as large as the guide's costs; the same ones for the same
+        simplices and step.
+    steps : int
+    enough : float
+        A sum of costs that is good enough to stop.
+
+    Returns
+    -------
+    ndarray of int64, shape (k', d + 1)
+        The best triangulation on the way.
+    """
+    current = best = np.asarray(simplices, dtype=np.int64)
+    least = float(costs_of(best).sum())
+    for step in range(steps):
+        if least <= enough or (deadline is not None and time.monotonic() >= deadline):
+            break
+
+        def disturbed(asked: NDArray[np.integer], step: int = step) -> NDArray[np.float64]:
+            return guide_of(asked) + (1 - step / steps) * noise_of(asked, step)
+
+        current = improve_by_flips(current, chirotope, disturbed, spanning=spanning, deadline=deadline)
+        found = float(costs_of(current).sum())
+        if found < least:
+            best, least = current, found
+    return improve_by_flips(best, chirotope, costs_of, spanning=spanning, deadline=deadline)
 
 
 class _State:

@@ -49,9 +49,7 @@ class PlanePoints:
         terms = np.true_divide(centred, largest).astype(float) * configuration.field.basis_floats
         spread = float(np.abs(terms).sum(axis=-1).max())
         # A sum of `degree` terms, each off by at most three roundings, summed and scaled with as many again.
-        return cls(
-            np.ascontiguousarray(terms.sum(axis=-1) / spread), 4 * (4 + 2 * degree) * _UNIT_ROUNDOFF
-        )
+        return cls(np.ascontiguousarray(terms.sum(axis=-1) / spread), 4 * (4 + 2 * degree) * _UNIT_ROUNDOFF)
 
 
 def _are_doubles(configuration: PointConfiguration) -> bool:

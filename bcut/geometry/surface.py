@@ -150,8 +150,8 @@ class Region:
             text = f"{min(a, b)},{max(a, b)}"
             if count == 1:
                 raise SurfaceError(
-                    f"{name}: the surface is not closed: triangle {self.triangles[numbers[0]]} is the only one with the "
-                    f"edge {text}; add the missing triangles"
+                    f"{name}: the surface is not closed: triangle {self.triangles[numbers[0]]} is the only one with "
+                    f"the edge {text}; add the missing triangles"
                 )
             if count > 2:
                 raise SurfaceError(
@@ -161,8 +161,8 @@ class Region:
             if len(numbers) == 2:
                 first, second = (self.triangles[number] for number in numbers)
                 raise SurfaceError(
-                    f"{name}: the triangles {first} and {second} run along the edge {text} in the same direction: one of "
-                    "them is wrongly oriented; list the vertices of each counterclockwise as seen from outside"
+                    f"{name}: the triangles {first} and {second} run along the edge {text} in the same direction: one "
+                    "of them is wrongly oriented; list the vertices of each counterclockwise as seen from outside"
                 )
 
     def _check_crossings(self) -> None:
@@ -170,8 +170,8 @@ class Region:
         if len(crossing):
             first, second = (self.triangles[number] for number in crossing[0].tolist())
             raise SurfaceError(
-                f"{self.configuration.name}: the surface crosses itself: the triangles {first} and {second} meet in more "
-                "than a common face"
+                f"{self.configuration.name}: the surface crosses itself: the triangles {first} and {second} meet in "
+                "more than a common face; move their vertices apart, or divide them where they meet"
             )
 
     def _check_orientation(self) -> None:
@@ -183,8 +183,8 @@ class Region:
                 continue
             if not self._faces_outwards(triangle):
                 raise SurfaceError(
-                    f"{self.configuration.name}: the triangle {triangle} and those connected with it are wrongly oriented: "
-                    "what they turn their backs to is not inside; reverse the order of the vertices of each"
+                    f"{self.configuration.name}: the triangle {triangle} and those connected with it are wrongly "
+                    "oriented: what they turn their backs to is not inside; reverse the order of the vertices of each"
                 )
             waiting = [start]
             while waiting:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
-from math import comb, inf
+from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +18,23 @@ from bcut.instance import load_instance
 from bcut.objectives.invariance import symmetries_of_table
 from bcut.objectives.measures import read_costs
 from bcut.objectives.objective import objective_of
-from bcut.objectives.syntax import ObjectiveName, read_level, read_objective
+from bcut.objectives.syntax import read_level, read_objective
 from bcut.result import Certificate, Question, Result
 from bcut.separation.driver import check_names
 from bcut.separation.observer import CutObserver
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Separator
 from bcut.solving.bottleneck import solve_bottleneck
+from bcut.solving.by_elimination import empty_part, solve_by_elimination
+from bcut.solving.by_fixing import bound_by_fixing, solve_by_fixing
 from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
 from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
+from bcut.solving.compact_part import begin_fixing, make_program
 from bcut.solving.embedding import costs_to_embed
 from bcut.solving.groups import GroupLike, subgroups_to_try, symmetries_of
 from bcut.solving.levels import Levels, solve_listed
+from bcut.solving.memory import Watch, watched
+from bcut.solving.methods import Traits, check_method, choose_method
 from bcut.solving.orbit_stage import OrbitStage, orbit_stage
 from bcut.solving.programs import formulation_name, make_formulation
 from bcut.solving.report import make_result
@@ -40,11 +45,6 @@ DEFAULT_SEPARATORS = ("link",)
 # Relaxations of stable sets are so weak that cliques close most of their gaps; link cuts are not valid for dissections.
 SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
 SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
-METHODS = ("auto", "listing", "orbits", "scip")
-# From so many (d+1)-subsets on, the symmetries of a configuration are used where it has at least so many; with more
-# subsets than can be listed, where it has any.
-_ORBITS_FROM, _SYMMETRIES = 10_000, 8
-_LISTED = 20_000_000
 
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
@@ -64,6 +64,7 @@ def solve(
     star: int | None = None,
     separators: Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
+    memory_limit: float | None = None,
     seed: int = 0,
     method: str = "auto",
     symmetries: GroupLike | None = None,
@@ -102,12 +103,17 @@ def solve(
         The cut families at work; a default set when omitted, none when empty.
     time_limit : float, optional
         In seconds; what was found is returned when it is reached.
+    memory_limit : float, optional
+        Of the process, in GiB; likewise.
     seed : int
         Of the solver's random choices.
-    method : {"auto", "listing", "orbits", "scip"}
+    method : {"auto", "listing", "orbits", "fixing", "elimination", "scip"}
         "listing" lists all simplices, bounds and fixes at the root, and lets SCIP branch on what is left; "orbits"
-        does so with orbits of simplices under the symmetries, for cardinality only; "scip" hands SCIP everything.
-        "auto" takes orbits for large symmetric configurations, and lists otherwise.
+        does so with orbits of simplices under the symmetries, for cardinality only; "fixing" bounds by a first-order
+        method, so that only some per cent of the simplices are ever in a solver; "elimination", for least weight in the
+        plane with all points used, takes edges away by theorems, without a certificate; "scip" hands SCIP everything.
+        "auto" takes orbits for large symmetric configurations, elimination or fixing for other large ones, and listing
+        otherwise.
     symmetries : path, or sequence of permutations, optional
         For the method "orbits", which "auto" then is: generators of the symmetries to work with, instead of all that
         there are. A file holds ``[[1,0,2,3],[0,1,3,2]]``, or is one of TOPCOM's with generators behind its points.
@@ -144,6 +150,7 @@ def solve(
         spanning,
         separators,
         time_limit,
+        memory_limit,
         seed,
         method,
         on_progress,
@@ -155,10 +162,7 @@ def solve(
     )
     search = run.search
     search.cut_observer = cut_observer
-    try:
-        run.solve()
-    except KeyboardInterrupt:
-        search.status = "interrupted"
+    run.within_limits(run.solve)
     if search.columns is None and search.status != "infeasible" and run.subgroups is None:
         place(search)
     return run.finish()
@@ -177,6 +181,7 @@ def bound(
     star: int | None = None,
     separators: Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
+    memory_limit: float | None = None,
     seed: int = 0,
     method: str = "auto",
     symmetries: GroupLike | None = None,
@@ -188,7 +193,9 @@ def bound(
     orbits, "link" is the only family that is at work, averaged over the symmetries.
     """
     if method == "scip":
-        raise InputError("method 'scip': it is for solve only; known here are auto, listing and orbits")
+        raise InputError(
+            "method 'scip': it is for solve only; known here are auto, listing, orbits and fixing"
+        )
     run = _Run(
         instance,
         objective,
@@ -197,18 +204,17 @@ def bound(
         spanning,
         separators,
         time_limit,
+        memory_limit,
         seed,
         method,
         on_progress,
         symmetries=symmetries,
         dissection=dissection,
         restrictions={"require": require, "forbid": forbid, "star": star},
+        only_bound=True,
     )
     run.search.status = "bound"
-    try:
-        run.bound()
-    except KeyboardInterrupt:
-        run.search.status = "interrupted"
+    run.within_limits(run.bound)
     run.search.columns = None
     return run.finish()
 
@@ -225,6 +231,7 @@ class _Run:
         spanning: bool,
         separators: Sequence[SeparatorLike] | None,
         time_limit: float | None,
+        memory_limit: float | None,
         seed: int,
         method: str,
         on_progress: Progress | None,
@@ -234,10 +241,11 @@ class _Run:
         invariant_under: int | GroupLike | None = None,
         dissection: bool = False,
         restrictions: dict[str, Any] | None = None,
+        only_bound: bool = False,
     ) -> None:
         self.started = time.perf_counter()
         formulation = formulation_name(formulation, dissection=dissection)
-        _check_options(time_limit, seed, method)
+        _check_options(time_limit, memory_limit, seed)
         self.name = read_objective(objective, sense)
         sense = self.name.sense
         following = [read_level(text) for text in then]
@@ -253,18 +261,33 @@ class _Run:
         if grouped and method not in ("auto", "orbits"):
             raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
         self.method = "orbits" if grouped else method
-        _check_method(self.name, following, self.method)
-        if following and self.method == "auto":
-            self.method = "listing"
+        check_method(self.method, self.name, following)
         self.subgroups: list[PermutationGroup] | None = None
         families = {_describe(item).split(":")[0] for item in given}
         self.link, self.only_link = "link" in families, families <= {"link"}
+        traits = Traits(
+            self.configuration,
+            self.name,
+            spanning=spanning,
+            whole_question=self.whole_question,
+            only_link=self.only_link,
+            following=bool(following),
+            symmetries=lambda: symmetry_group(self.configuration).order,
+            only_bound=only_bound,
+        )
+        self.method = choose_method(self.method, traits)
+        self.spanning, self.memory_limit = spanning, memory_limit
         self.stage = self._orbits(objective, sense, spanning, time_limit, symmetries)
         if self.stage is not None and invariant_under is not None:
             self.subgroups = subgroups_to_try(
                 self.configuration, self.stage.group, invariant_under, seed=seed
             )
-        if self.stage is None:
+        if self.method == "fixing":
+            # The program itself is made when limits are watched.
+            whole, self.size = begin_fixing(self.configuration, self.name, spanning=spanning), (0, 0)
+        elif self.method == "elimination":
+            whole, self.size = empty_part(self.configuration), (0, 0)
+        elif self.stage is None:
             listed = make_formulation(
                 formulation,
                 self.configuration,
@@ -296,7 +319,7 @@ class _Run:
             formulation=formulation,
             separators=[_describe(item) for item in given],
             seed=seed,
-            limits={"time": time_limit},
+            limits={"time": time_limit, "memory": memory_limit},
             method=self.method,
             invariant_under=None
             if self.subgroups is None
@@ -315,33 +338,30 @@ class _Run:
         seconds: float | None,
         symmetries: GroupLike | None,
     ) -> OrbitStage | None:
-        """Return the stage over orbits where that is the way to go, and settle what "auto" means."""
-        n, d = self.configuration.n, self.configuration.dimension
-        invariant = objective == "cardinality"
-        if self.method == "orbits" and not self.whole_question:
-            raise InputError(
-                "method 'orbits': it works with formulation 2, and without required or forbidden faces and stars; use "
-                "the method listing"
-            )
-        if self.method == "orbits" and not (invariant or objective.startswith("costs:")):
-            raise InputError(
-                f"method 'orbits': objective '{objective}' is not known to be invariant; use cardinality or costs:FILE"
-            )
-        if self.method == "auto":
-            # Other families than link are at work in the tree only, over orbits: who asks for them wants the listing.
-            large = invariant and self.only_link and self.whole_question and comb(n, d + 1) >= _ORBITS_FROM
-            fewest = _SYMMETRIES if comb(n, d + 1) <= _LISTED else 2
-            symmetric = large and symmetry_group(self.configuration).order >= fewest
-            self.method = "orbits" if symmetric else "listing"
+        """Return the stage over orbits where that is the method."""
         if self.method != "orbits":
             return None
         group = symmetries_of(self.configuration, symmetries)
-        if not invariant:
+        if objective != "cardinality":
             default, table = read_costs(Path(objective.partition(":")[2]), self.configuration)
             group = symmetries_of_table(group, default, table)
         return orbit_stage(
             self.configuration, objective, sense=sense, spanning=spanning, group=group, seconds=seconds
         )
+
+    def within_limits(self, work: Callable[[], None]) -> None:
+        """Do the work until it is done, a limit is reached, or Ctrl-C comes."""
+        search = self.search
+        watch = Watch()
+        try:
+            with watched(watch, memory=self.memory_limit, deadline=search.deadline):
+                work()
+        except KeyboardInterrupt:
+            search.status = "interrupted"
+        except MemoryError:
+            search.status = "limit"
+        if watch.reached and search.status == "interrupted":
+            search.status = "limit"
 
     def solve(self) -> None:
         """Search for an optimum."""
@@ -352,6 +372,11 @@ class _Run:
                 solve_invariant(self.search, self.stage, self.subgroups, cuts=self.link)
         elif self.method == "scip":
             solve_in_scip(self.search)
+        elif self.method == "fixing":
+            self.size = make_program(self.search, self.name, only_link=self.only_link)
+            solve_by_fixing(self.search)
+        elif self.method == "elimination":
+            self.size = solve_by_elimination(self.search).size
         elif self.levels is not None:
             self.levels.solve()
         else:
@@ -363,6 +388,10 @@ class _Run:
         if self.stage is not None:
             bound_by_orbits(search, self.stage, cuts=self.link)
             search.status = "limit" if search.bound is None else "bound"
+            return
+        if self.method == "fixing":
+            self.size = make_program(search, self.name, only_link=self.only_link)
+            bound_by_fixing(search)
             return
         if self.name.is_bottleneck:
             solve_bottleneck(search, branching=False)
@@ -419,20 +448,13 @@ class _Run:
         return make_infeasibility_certificate(program)
 
 
-def _check_options(time_limit: float | None, seed: int, method: str) -> None:
-    if method not in METHODS:
-        raise InputError(f"unknown method '{method}': known are {', '.join(METHODS)}")
+def _check_options(time_limit: float | None, memory_limit: float | None, seed: int) -> None:
     if time_limit is not None and not 0 <= time_limit < inf:
         raise InputError(f"time limit {time_limit}: give a finite number of seconds that is not negative")
+    if memory_limit is not None and not 0 < memory_limit < inf:
+        raise InputError(f"memory limit {memory_limit}: give a finite positive number of GiB")
     if seed < 0:
         raise InputError(f"seed {seed}: give an integer that is not negative")
-
-
-def _check_method(name: ObjectiveName, following: Sequence[ObjectiveName], method: str) -> None:
-    """Refuse methods that know sums of one objective only."""
-    if method in ("orbits", "scip") and (name.is_bottleneck or following):
-        what = f"a bottleneck such as '{name.text}'" if name.is_bottleneck else "one objective after another"
-        raise InputError(f"method '{method}' does not work with {what}; use the method listing")
 
 
 def _default_separators(formulation: str, dissection: bool) -> tuple[str, ...]:

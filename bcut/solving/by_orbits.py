@@ -35,6 +35,8 @@ _MOST_FACES = 300_000
 # Where the bound is not reached: columns among which better triangulations are sought, and for how long.
 _MOST_TO_IMPROVE = 60_000
 _SECONDS_TO_IMPROVE = 60.0
+# Of the time that is left, for invariant triangulations that reach the bound.
+_SHARE_FOR_TARGET = 0.4
 
 
 def known_triangulation(stage: OrbitStage) -> Part:
@@ -232,7 +234,9 @@ def _reach(
     if len(part.columns) <= _SMALL:
         decided = _branch(search, part, cutoff, seconds=_SECONDS_FOR_SMALL)
     if decided in ("", "limit") and not is_optimal(search):
-        _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=inf)
+        left = search.seconds_left
+        seconds = inf if left is None else _SHARE_FOR_TARGET * left
+        _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=seconds)
     if is_optimal(search):
         return "reached"
     if decided not in ("infeasible", "interrupted"):

@@ -44,7 +44,7 @@ def make_certificate(
     # Stages are re-checked with cocircuit rows; their cuts are those of triangulations.
     if refutation is not None and formulation.name == "2":
         target, stages = refutation
-        refutes = {"target": str(objective.sign * target), "stages": [_stage(stage) for stage in stages]}
+        refutes = {"target": str(objective.sign * target), "stages": [stage_data(stage) for stage in stages]}
     return Certificate(
         bound=str(objective.sign * bound.value),
         flag=formulation.chirotope.bases[0].tolist(),
@@ -71,7 +71,8 @@ def _row(formulation: Formulation, number: int) -> object:
     return name
 
 
-def _stage(stage: Stage) -> dict[str, object]:
+def stage_data(stage: Stage) -> dict[str, object]:
+    """Write out one step of a refutation."""
     formulation, bound = stage.formulation, stage.bound
     cuts = zip(stage.cuts, bound.multipliers[len(formulation.row_faces) :].tolist(), strict=True)
     return {

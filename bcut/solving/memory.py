@@ -53,28 +53,25 @@ def peak_memory() -> int:
 
 
 @contextmanager
-def watched(*, memory: float | None, deadline: float | None) -> Iterator[Watch]:
+def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> Iterator[None]:
     """Interrupt the block, as Ctrl-C would, when the process uses too much memory or has no more time.
 
     Solvers and loops hear an interrupt within a moment and keep what they have found, and so one mechanism serves all
     stages; those that watch the deadline themselves end before this does.
 
+    Nothing is watched outside the main thread, where interrupts do not arrive.
+
     Parameters
     ----------
+    watch : Watch
+        Told of the limit when it is reached.
     memory : float or None
         In GiB.
     deadline : float or None
         Value of `time.monotonic`.
-
-    Yields
-    ------
-    Watch
-        Tells afterwards whether an interrupt came from here. Nothing is watched outside the main thread, where
-        interrupts do not arrive.
     """
-    watch = Watch()
     if (memory is None and deadline is None) or threading.current_thread() is not threading.main_thread():
-        yield watch
+        yield
         return
     ended = threading.Event()
 
@@ -92,7 +89,7 @@ def watched(*, memory: float | None, deadline: float | None) -> Iterator[Watch]:
     watcher = threading.Thread(target=look, name="bcut-limits", daemon=True)
     watcher.start()
     try:
-        yield watch
+        yield
     finally:
         ended.set()
         watcher.join()

@@ -41,8 +41,8 @@ class RegionResult:
     instance : dict
         Name, points (exact, as texts), faces and the digest of the points.
     status : {"optimal", "infeasible", "limit", "interrupted"}
-        "optimal": the region has a triangulation, and `triangulation` has the fewest tetrahedra; "infeasible": there is no
-        triangulation without new points, and `triangulation` covers the largest volume.
+        "optimal": the region has a triangulation, and `triangulation` has the fewest tetrahedra; "infeasible": there
+        is no triangulation without new points, and `triangulation` covers the largest volume.
     volume, covered : str
         Of the region; of the tetrahedra in `triangulation`.
     value, bound : int or None
@@ -51,8 +51,8 @@ class RegionResult:
     tetrahedra : int
         How many lie inside and fit to the surface.
     certificate : dict
-        Trees whose leaves carry multipliers: ``infeasible`` proves that there is no triangulation, ``covered`` that no more
-        can be covered, ``cardinality`` that no triangulation has fewer tetrahedra; None for what is not claimed.
+        Trees whose leaves carry multipliers: ``infeasible`` proves that there is no triangulation, ``covered`` that no
+        more can be covered, ``cardinality`` that no triangulation has fewer tetrahedra; None for what is not claimed.
     """
 
     instance: dict[str, Any]
@@ -151,6 +151,8 @@ def region(
     >>> bcut.region("schoenhardt").status
     'infeasible'
     """
+    if time_limit is not None and not time_limit > 0:
+        raise InputError(f"a time limit of {time_limit} seconds is no positive number; leave it out for none")
     if isinstance(instance, tuple):
         points, faces = instance
         if not isinstance(points, PointConfiguration):
@@ -194,7 +196,9 @@ class _Work:
         result.tetrahedra = len(tetrahedra)
         if self.columns is not None:
             result.triangulation = tetrahedra[np.sort(np.array(self.columns, dtype=np.int64))].tolist()
-            result.covered = str(sum(self.region.volumes[column] for column in self.columns) * self.unit)
+            covered = sum(self.region.volumes[column] for column in self.columns)
+            result.covered = str(covered * self.unit)
+            result.value = len(self.columns) if covered == self.region.volume else None
         result.nodes = sum(program.nodes for program in self.programs)
         result.versions = {
             "bcut": bcut.__version__,
@@ -209,15 +213,15 @@ class _Work:
         region, result = self.region, self.result
         crossing = tetrahedra_crossing(region)
         covering = covering_program(region)
-        best, tree = self._least(covering, crossing, [1] * len(crossing))
+        self.columns = self._greedy(crossing)
+        is_whole = sum(region.volumes[column] for column in self.columns) == region.volume
+        best, tree = self._least(covering, crossing, [1] * len(crossing), self.columns if is_whole else None)
         if best is not None:
-            result.status, result.value, result.bound = "optimal", len(best), len(best)
+            result.status, result.bound = "optimal", len(best)
             result.certificate["cardinality"] = self._written(tree, covering)
             return
         result.certificate["infeasible"] = self._written(tree, covering)
-        # Multipliers prove at once that nothing can be covered where no tetrahedron lies inside.
         packing = packing_program(region, crossing)
-        self.columns = self._greedy(crossing)
         best, tree = self._least(packing, crossing, [-volume for volume in region.volumes], self.columns)
         result.certificate["covered"] = self._written(tree, packing)
         result.status = "infeasible"

@@ -101,11 +101,22 @@ def load_result(source: Source) -> tuple[ResultData, str]:
     ResultError
         It cannot be read, belongs to another schema, lacks an entry or has one of the wrong type.
     """
+    data, label = plain_data(source)
+    return _Reader(label).result(data), label
+
+
+def plain_data(source: Source) -> tuple[Any, str]:
+    """Return the data of a result, not looked at yet, and what to call it in messages.
+
+    Raises
+    ------
+    ResultError
+        It cannot be read.
+    """
     if not isinstance(source, str | os.PathLike):
-        source = source if isinstance(source, Mapping) else source.to_dict()
-        return _Reader("the result").result(source), "the result"
+        return source if isinstance(source, Mapping) else source.to_dict(), "the result"
     label = f"result file {os.fspath(source)}"
-    return _Reader(label).result(_parse(Path(source), label)), label
+    return _parse(Path(source), label), label
 
 
 def _parse(path: Path, label: str) -> Any:

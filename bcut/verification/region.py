@@ -1,9 +1,9 @@
 """Exact re-checking of results about regions, from their coordinates alone.
 
-The surface is closed, does not cross itself, and has the region on its inner side; tetrahedra lie inside, fit to the surface and
-to each other face to face, and have the volume that is claimed, which is compared with the region's volume by the divergence
-theorem. Proofs are trees; their leaves carry multipliers, whose bounds are computed again over all tetrahedra inside, which are
-found again from the coordinates. Whether a point is inside is told by a ray.
+The surface is closed, does not cross itself, and has the region on its inner side; tetrahedra lie inside, fit to the
+surface and to each other face to face, and have the volume that is claimed, which is compared with the region's volume
+by the divergence theorem. Proofs are trees; their leaves carry multipliers, whose bounds are computed again over all
+tetrahedra inside, which are found again from the coordinates. Whether a point is inside is told by a ray.
 """
 
 from __future__ import annotations
@@ -11,17 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import combinations, count
-from math import lcm
+from itertools import combinations
 from typing import Any, NoReturn
 
 from bcut.errors import ConfigurationError, ResultError, VerificationError
 from bcut.geometry.configuration import PointConfiguration
-from bcut.geometry.numbers import parse_coordinate
-from bcut.verification.cut_data import Candidates
-from bcut.verification.exact_points import ExactPoints, Simplex, without
+from bcut.verification.exact_points import Simplex, without
+from bcut.verification.reading import Source, plain_data
+from bcut.verification.surface import SurfaceCheck
 
-Vector = tuple[int, int, int]
 STATUSES = ("optimal", "infeasible", "limit", "interrupted")
 
 
@@ -52,10 +50,28 @@ class RegionVerification:
     fewest: bool = False
     checks: list[str] = field(default_factory=list)
 
+    @property
+    def settled(self) -> bool:
+        """Whether the tetrahedra were proven to be the best ones."""
+        return self.fewest or self.covered_is_largest
 
-def is_region(data: Any) -> bool:
-    """Tell whether plain data is a result about a region."""
-    return isinstance(data, Mapping) and data.get("kind") == "region"
+
+def verified_region(source: Source) -> RegionVerification | None:
+    """Re-check a result if it is about a region; None if it is about something else.
+
+    Parameters
+    ----------
+    source : mapping, RegionResult or path
+
+    Raises
+    ------
+    VerificationError, ResultError
+        As `verify_region`.
+    """
+    data, label = plain_data(source)
+    if not isinstance(data, Mapping) or data.get("kind") != "region":
+        return None
+    return verify_region(data, label)
 
 
 def verify_region(data: Mapping[str, Any], label: str) -> RegionVerification:
@@ -75,7 +91,10 @@ def verify_region(data: Mapping[str, Any], label: str) -> RegionVerification:
     ResultError
         It is no readable result.
     """
-    return _Verifier(data, label).run()
+    try:
+        return _Verifier(data, label).run()
+    except VerificationError as error:
+        raise VerificationError(f"{label}: {error}") from None
 
 
 class _Verifier:
@@ -89,12 +108,14 @@ class _Verifier:
         instance = data.get("instance")
         if not isinstance(instance, Mapping) or not isinstance(instance.get("points"), list):
             self._unreadable("instance.points is missing")
-        self._read_points(instance)
-        self.triangles = [self._points_list(face, 3) for face in self._list(instance.get("faces"), "faces")]
-        self.surface = {tuple(sorted(triangle)) for triangle in self.triangles}
+        self.n = len(instance["points"])
+        faces = [self._points_list(face, 3) for face in self._list(instance.get("faces"), "faces")]
+        self.geometry = SurfaceCheck(self._read_points(instance), faces)
+        self.points, self.sides = self.geometry.points, self.geometry.sides
+        self.surface = self.geometry.surface
         self._inside: list[Simplex] | None = None
 
-    def _read_points(self, instance: Mapping[str, Any]) -> None:
+    def _read_points(self, instance: Mapping[str, Any]) -> list[list[Fraction]]:
         try:
             configuration = PointConfiguration.from_values(instance["points"], origin="instance.points")
         except ConfigurationError as error:
@@ -105,21 +126,17 @@ class _Verifier:
             self._refuse(
                 "instance.digest does not belong to instance.points: one of them was changed after the run"
             )
-        rows = [[parse_coordinate(text) for text in point] for point in instance["points"]]
-        self.points = ExactPoints(rows)
-        self.sides = Candidates(self.points)
-        scalars = [[Fraction(value) for value in point] for point in configuration.scalars()]  # type: ignore[arg-type]
-        unit = lcm(*(value.denominator for point in scalars for value in point))
-        # Twelve times as fine, so that barycentres are integers.
-        self.integers: list[Vector] = [
-            (int(12 * unit * x), int(12 * unit * y), int(12 * unit * z)) for x, y, z in scalars
-        ]
         self.checks.append(f"{configuration.n} points have the digest of the instance")
+        return [[Fraction(value) for value in point] for point in configuration.scalars()]  # type: ignore[arg-type]
 
     def run(self) -> RegionVerification:
         """Check the surface, the tetrahedra and the proofs."""
-        self._check_surface()
-        volume = self._region_volume()
+        self.geometry.check()
+        self.checks.append(
+            f"the {len(self.geometry.triangles)} triangles are a closed surface, which does not cross itself, "
+            "around a region"
+        )
+        volume = self.geometry.volume()
         if self._rational("volume") != volume * self.points.volume_unit:
             self._refuse(f"its volume is {volume * self.points.volume_unit}, not {self.data.get('volume')}")
         tetrahedra = self._check_tetrahedra()
@@ -170,67 +187,147 @@ class _Verifier:
             end = ", which is the least number, proven exactly" if fewest else ""
             text = f"triangulable: {len(tetrahedra or ())} tetrahedra{end}"
         elif triangulable is False:
-            text = f"infeasible, proven exactly: there is no triangulation without new points; {exact} of {volume * unit} "
-            text += "is covered, and no more can be, proven exactly" if largest else "is covered"
+            text = "infeasible, proven exactly: there is no triangulation without new points; "
+            text += f"{exact} of {volume * unit} is covered"
+            text += ", and no more can be, proven exactly" if largest else ""
         else:
             text = f"{exact or 0} of {volume * unit} is covered; nothing was proven"
         return RegionVerification(text, volume * unit, exact, triangulable, largest, fewest, self.checks)
 
-    # The surface
+    def _all_inside(self) -> list[Simplex]:
+        if self._inside is None:
+            self._inside = [t for t in combinations(range(self.n), 4) if self.geometry.fits(t)]
+        return self._inside
 
-    def _check_surface(self) -> None:
-        edges: dict[tuple[int, int], int] = {}
-        for number, (a, b, c) in enumerate(self.triangles):
-            if not any(
-                self.points.value(self.points.hyperplane((a, b, c)), p) for p in range(self.points.n)
-            ):
-                self._refuse(f"the points {[a, b, c]} lie on a line")
-            for edge in ((a, b), (b, c), (c, a)):
-                if edge in edges:
-                    self._refuse(f"the surface is not oriented: two triangles run along {list(edge)}")
-                edges[edge] = number
-        for a, b in edges:
-            if (b, a) not in edges:
-                self._refuse(f"the surface is not closed at the edge {[a, b]}")
-        for first, second in combinations(sorted(self.surface), 2):
-            if self._triangles_cross(first, second):
-                self._refuse(f"the triangles {list(first)} and {list(second)} of the surface cross")
-        component = list(range(len(self.triangles)))
-        for _ in component:
-            for (a, b), number in edges.items():
-                other = edges[b, a]
-                component[number] = component[other] = min(component[number], component[other])
-        for number in sorted(set(component)):
-            if self._winding(self.triangles[number], behind=True) != 1:
+    def _check_tetrahedra(self) -> list[Simplex] | None:
+        listed = self.data.get("triangulation")
+        if listed is None:
+            return None
+        tetrahedra = [tuple(sorted(self._points_list(t, 4))) for t in self._list(listed, "triangulation")]
+        for tetrahedron in tetrahedra:
+            if not self.geometry.fits(tetrahedron):
                 self._refuse(
-                    f"the triangle {list(self.triangles[number])} of the surface is wrongly oriented"
+                    f"the tetrahedron {list(tetrahedron)} is flat, not inside, or crosses the surface"
                 )
+        for first, second in combinations(tetrahedra, 2):
+            if first == second or self.sides.crossing(first, second):
+                self._refuse(f"the tetrahedra {list(first)} and {list(second)} do not meet face to face")
         self.checks.append(
-            f"the {len(self.triangles)} triangles are a closed surface, which does not cross itself, around a region"
+            f"{len(tetrahedra)} tetrahedra lie inside, and meet each other and the surface face to face"
         )
+        return tetrahedra
 
-    def _triangles_cross(self, first: Simplex, second: Simplex) -> bool:
-        """Tell whether two triangles do not meet in a common face.
+    # Proofs
 
-        They do if and only if some tetrahedron with the first one as a face meets the second one in a common face, or the two
-        lie in one plane and do so there; a point off that plane makes tetrahedra of both questions.
-        """
-        apexes = [p for p in range(self.points.n) if p not in second and self._independent((*first, p))]
-        # A tetrahedron over `first` on one side: what it and `second` share is in `first` or beyond it, so try both sides.
-        plus = [p for p in apexes if self.sides.orientation(tuple(sorted((*first, p)))) != 0]
-        plane = self.points.hyperplane(first)
-        off = [p for p in second if self.points.side(plane, p)]
-        if off and len({self.points.side(plane, p) for p in off}) == 1:
-            # `second` is on one closed side: an apex on the other one meets it in the plane only.
-            wanted = -self.points.side(plane, off[0])
-            plus = [p for p in plus if self.points.side(plane, p) == wanted] or plus
-            apex = plus[0] if plus and self.points.side(plane, plus[0]) == wanted else None
-            if apex is not None:
-                return self.sides_cross((*first, apex), second)
-        return self._segments_cross(first, second)
+    def _proves(self, tree: Any, cost: Any, floor: int, *, equations: bool) -> bool:
+        """Refuse a tree one of whose leaves does not prove ``sum of costs > floor``."""
+        self._check_tree(tree, cost, floor, equations, (), frozenset())
+        return True
 
-    def sides_cross(self, tetrahedron: Sequence[int], other: Simplex) -> bool:
-        """Tell whether a tetrahedron and a triangle do not meet in a common face."""
-        from bcut.verification.cut_data import cross
+    def _check_tree(
+        self,
+        tree: Any,
+        cost: Any,
+        floor: int,
+        equations: bool,
+        chosen: tuple[Simplex, ...],
+        excluded: frozenset[Simplex],
+    ) -> None:
+        if not isinstance(tree, Mapping):
+            self._unreadable("a proof is no tree of branches and multipliers")
+        if "branch" in tree:
+            column = tuple(sorted(self._points_list(tree["branch"], 4)))
+            self._check_tree(tree.get("with"), cost, floor, equations, (*chosen, column), excluded)
+            self._check_tree(tree.get("without"), cost, floor, equations, chosen, excluded | {column})
+            return
+        bound = self._bound(tree, cost, equations, chosen, excluded)
+        if not bound > floor:
+            self._refuse(f"multipliers prove a bound of {bound} only, which has to exceed {floor}")
 
-        return cross(self.sides, tuple(sorted(tetrahedron)), other)
+    def _bound(
+        self,
+        leaf: Mapping[str, Any],
+        cost: Any,
+        equations: bool,
+        chosen: tuple[Simplex, ...],
+        excluded: frozenset[Simplex],
+    ) -> Fraction:
+        """Return what multipliers prove of the sums of costs with some tetrahedra chosen and some excluded."""
+        total = Fraction(0)
+        weights: dict[Any, Fraction] = {}
+        for entry in self._list(leaf.get("multipliers"), "multipliers"):
+            if not isinstance(entry, list) or len(entry) != 2 or not isinstance(entry[1], str):
+                self._unreadable("a multiplier is no pair of a row and a number")
+            value = self._fraction(entry[1])
+            if equations:
+                face = tuple(sorted(self._points_list(entry[0], 3)))
+                weights[face] = weights.get(face, Fraction(0)) + value
+                total += value if face in self.surface else 0
+                continue
+            clique = [tuple(sorted(self._points_list(t, 4))) for t in self._list(entry[0], "a row")]
+            if value > 0 or not all(self.sides.crossing(*pair) for pair in combinations(clique, 2)):
+                self._refuse(
+                    "a row of its proof has tetrahedra that do not cross each other, or a wrong sign"
+                )
+            total += value
+            for member in set(clique):
+                weights[member] = weights.get(member, Fraction(0)) + value
+        for tetrahedron in self._all_inside():
+            if tetrahedron in excluded:
+                continue
+            reduced = cost(tetrahedron) - self._weight(tetrahedron, weights, equations)
+            is_free = not any(self.sides.crossing(tetrahedron, other) for other in chosen)
+            if tetrahedron in chosen or (reduced < 0 and is_free):
+                total += reduced
+        return total
+
+    def _weight(self, tetrahedron: Simplex, weights: Mapping[Any, Fraction], equations: bool) -> Fraction:
+        """Return the sum over rows of the multiplier times the entry of a tetrahedron."""
+        if not equations:
+            return weights.get(tetrahedron, Fraction(0))
+        total = Fraction(0)
+        for position, apex in enumerate(tetrahedron):
+            face = without(tetrahedron, position)
+            value = weights.get(face)
+            if value:
+                above = face in self.surface or self.sides[face][0] >> apex & 1
+                total += value if above else -value
+        return total
+
+    # Reading
+
+    def _points_list(self, value: Any, size: int) -> Simplex:
+        if (
+            not isinstance(value, Sequence)
+            or isinstance(value, str)
+            or len(value) != size
+            or len(set(map(str, value))) < size
+            or not all(isinstance(v, int) and not isinstance(v, bool) and 0 <= v < self.n for v in value)
+        ):
+            self._unreadable(f"{value!r} is no list of {size} different points")
+        return tuple(value)
+
+    def _list(self, value: Any, what: str) -> list[Any]:
+        if not isinstance(value, list):
+            self._unreadable(f"{what} is no list")
+        return value
+
+    def _rational(self, key: str) -> Fraction:
+        value = self.data.get(key)
+        if not isinstance(value, str):
+            self._unreadable(f"{key} is no exact number as text")
+        return self._fraction(value)
+
+    def _fraction(self, text: str) -> Fraction:
+        try:
+            return Fraction(text)
+        except (ValueError, ZeroDivisionError):
+            self._unreadable(f"{text[:40]!r} is no rational number")
+
+    def _refuse(self, reason: str) -> NoReturn:
+        raise VerificationError(reason)
+
+    def _unreadable(self, reason: str) -> NoReturn:
+        raise ResultError(
+            f"{self.label}: {reason}; take the file as 'bcut region --output' wrote it, or solve the region again"
+        )

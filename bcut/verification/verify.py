@@ -24,6 +24,7 @@ from bcut.verification.exact_points import ExactPoints, Simplex
 from bcut.verification.goals import Certifier, Goal, Settled, certify
 from bcut.verification.orbit_certificate import MAX_TABLE, certified_orbit_bound, is_invariant
 from bcut.verification.reading import ResultData, Source, load_result
+from bcut.verification.region import verified_region
 from bcut.verification.triangulation import check_triangulation
 
 
@@ -47,7 +48,7 @@ class Verification:
     statement : str
         One line for people; never stronger than what was checked.
     value : Fraction or None
-        Of the triangulation, re-computed; None without one.
+        Of the triangulation, re-computed; None without one. Of a region, the volume that is covered.
     exact_bound : Fraction or None
         Proven by the certificate: no triangulation has a better value. Unrounded.
     rounded_bound : Fraction or None
@@ -76,7 +77,7 @@ def verify(result: Source, *, max_subsets: int | None = None) -> Verification:
     Parameters
     ----------
     result : mapping, Result or path
-        The data of a result file, what `bcut.solve` returned, or where the file is.
+        The data of a result file, what `bcut.solve` or `bcut.region` returned, or where the file is.
     max_subsets : int, optional
         Certificates are re-computed only where at most so many sets of points have to be looked at (of d + 1 points, or
         of d points where the certificate uses symmetries and no cuts); for larger configurations the statement says
@@ -100,6 +101,11 @@ def verify(result: Source, *, max_subsets: int | None = None) -> Verification:
     >>> bcut.verify("cube.json").statement
     'optimal, proven exactly: the triangulation is verified, and its value 5 meets the bound 5'
     """
+    region = verified_region(result)
+    if region is not None:
+        return Verification(
+            region.statement, region.covered, proven_optimal=region.settled, checks=region.checks
+        )
     data, label = load_result(result)
     try:
         return _Verifier(data, max_subsets).run()

@@ -23,11 +23,12 @@ from bcut.cli.running import carry_out
 @separator_options
 @click.option(
     "--method",
-    type=click.Choice(["auto", "listing", "orbits"]),
+    type=click.Choice(["auto", "listing", "orbits", "fixing"]),
     default="auto",
     show_default=True,
     help="listing: all simplices. orbits: orbits of simplices under the symmetries (cardinality only; of the "
-    "separators only link is at work). auto: orbits for large symmetric configurations, else listing.",
+    "separators only link is at work). fixing: a first-order method for all simplices, cuts for the few that matter. "
+    "auto: orbits for large symmetric configurations, fixing for other large ones, else listing.",
 )
 @symmetry_options
 @run_options

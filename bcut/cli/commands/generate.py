@@ -21,11 +21,11 @@ import click
 @click.option(
     "--format",
     "kind",
-    type=click.Choice(["json", "dat", "csv"]),
-    help="native JSON, TOPCOM or a table; json where nothing else tells.",
+    type=click.Choice(["json", "dat", "csv", "off"]),
+    help="native JSON, TOPCOM, a table, or OFF with the faces of a surface; json where nothing else tells.",
 )
 def generate(instance: str | None, list_families: bool, output: Path | None, kind: str | None) -> int:
-    """Write the points of INSTANCE, exactly, as a file of points.
+    """Write the points of INSTANCE, exactly, as a file of points; as OFF, with its faces.
 
     INSTANCE is a member of a family, such as cube:4, or a file of points, which is then converted.
     """
@@ -45,9 +45,25 @@ def generate(instance: str | None, list_families: bool, output: Path | None, kin
     from bcut.instance import load_instance
 
     check_output(output, instance)
+    if (kind or (output.suffix[1:].lower() if output is not None else "")) == "off":
+        return _write_surface(instance, output)
     configuration = load_instance(instance)
     if output is None:
         emit(format_points(configuration, kind or "json"))
     else:
         write_points(configuration, output, kind=kind or (None if output.suffix else "json"))
+    return 0
+
+
+def _write_surface(instance: str, output: Path | None) -> int:
+    from bcut.cli.output import emit
+    from bcut.files.atomic import write_text
+    from bcut.files.surfaces import format_off
+    from bcut.solving.region import load_surface
+
+    text = format_off(*load_surface(instance))
+    if output is None:
+        emit(text)
+    else:
+        write_text(output, text)
     return 0
