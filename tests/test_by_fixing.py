@@ -50,7 +50,7 @@ CASES = [
 ]
 
 
-def points(values: list[list[int]]) -> bcut.PointConfiguration:
+def points(values: list[list[float]]) -> bcut.PointConfiguration:
     return bcut.PointConfiguration.from_values(values, name="points", origin="test")
 
 
@@ -68,6 +68,31 @@ def test_the_optimum_is_that_of_the_listing(
     assert found.size.rows == expected.size.rows
     better = found.root.lp - found.value
     assert (better if sense == "min" else -better) <= 1e-6 * abs(found.value)
+
+
+SMALLEST: list[list[list[float]]] = [
+    [[0, 0], [1, 0], [0, 1]],
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    [[0, 0], [1e-300, 0], [0, 1e-300], [1e-300, 1e-300]],
+    [[0, 0], [10**30, 0], [0, 10**30], [10**30, 10**30 + 1], [5, 7]],
+]
+
+
+@pytest.mark.parametrize("values", SMALLEST)
+@pytest.mark.parametrize("objective", ["cardinality", "weight"])
+def test_programs_without_rows_and_extreme_coordinates(values: list[list[float]], objective: str) -> None:
+    expected = solve(points(values), objective=objective, method="listing")
+    found = solve(points(values), objective=objective, method="fixing")
+    assert (found.status, found.value) == ("optimal", expected.value)
+
+
+def test_costs_of_very_different_sizes() -> None:
+    """Slivers cost 10^12 times as much as others, and are dropped before anything is bounded."""
+    expected = solve("sphere:12,3,seed=2", objective="aspect-ratio", spanning=True, method="listing")
+    found = solve("sphere:12,3,seed=2", objective="aspect-ratio", spanning=True, method="fixing")
+    assert found.optimal
+    assert found.value == pytest.approx(expected.value, rel=1e-9)
+    assert found.size.columns == expected.size.columns
 
 
 @pytest.mark.parametrize(

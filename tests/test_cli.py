@@ -85,8 +85,8 @@ def solved(*arguments: str, capsys: Captured, status: int = 0) -> dict[str, Any]
 def test_the_commands_are_those_of_the_design() -> None:
     top = {path[0] for path in COMMANDS}
     assert top == {
-        "solve", "bound", "verify", "regular", "separators", "objectives", "experiment", "cuts", "info", "generate",
-        "export", "plot",
+        "solve", "bound", "verify", "regular", "region", "separators", "objectives", "experiment", "cuts", "info",
+        "generate", "export", "plot",
     }  # fmt: skip
     groups = {"list", "check", "new", "run", "report", "show", "replay", "verify"}
     assert {path[1] for path in COMMANDS if len(path) > 1} == groups
@@ -118,7 +118,7 @@ def test_the_help_names_the_default_separators() -> None:
 
 
 def test_the_methods_are_those_of_the_library() -> None:
-    for name, missing in (("solve", set()), ("bound", {"scip"})):
+    for name, missing in (("solve", set()), ("bound", {"elimination", "scip"})):
         (option,) = [p for p in COMMANDS[name,].params if p.name == "method"]
         assert isinstance(option.type, click.Choice)
         assert set(option.type.choices) == set(METHODS) - missing

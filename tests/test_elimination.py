@@ -294,3 +294,15 @@ def test_solving_by_elimination_gives_a_result_that_verifies() -> None:
 def test_other_questions_are_refused(name: str, options: dict[str, object]) -> None:
     with pytest.raises(BcutError, match="method 'elimination'"):
         bcut.solve(name, method="elimination", **options)  # type: ignore[arg-type]
+
+
+def test_larger_problems_of_this_kind_are_solved_so_by_themselves() -> None:
+    def method(name: str, **options: object) -> str:
+        return bcut.solve(name, objective="weight", **options).problem.method  # type: ignore[arg-type]
+
+    assert method("random:100,2,seed=1", spanning=True) == "elimination"
+    assert method("random:20,2,seed=1", spanning=True) == "listing"
+    assert method("random:100,2,seed=1", spanning=True, separators=["clique"]) != "elimination"
+    assert (
+        bcut.bound("random:100,2,seed=1", objective="weight", spanning=True).problem.method != "elimination"
+    )

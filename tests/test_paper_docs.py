@@ -53,6 +53,12 @@ def test_the_commands_of_the_readme_about_regions_run(
     assert "infeasible, proven exactly" in capsys.readouterr().out
 
 
+def test_the_python_about_regions_prints_what_it_says(capsys: Captured) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", PAGES["regions"], re.DOTALL)
+    exec(compile(code, "regions.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines() == re.findall(r"\)  # (.*)", code)
+
+
 def test_the_table_of_regions_is_right() -> None:
     rows = re.findall(r"^\| `(\S+)` \| (\d+) \| (\d+) \| (\S+) \| (\S+) % \|", PAGES["regions"], re.MULTILINE)
     assert len(rows) == 9

@@ -305,6 +305,25 @@ def test_no_time_leaves_a_result_that_verifies() -> None:
         bcut.region("schoenhardt", time_limit=0)
 
 
+def test_ctrl_c_keeps_what_was_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    import bcut.solving.region as module
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "least", interrupted)
+    result = tmp_path / "r.json"
+    assert run(["region", "twisted-prism:5", "--output", str(result)]) == 130
+    assert "interrupted" in capsys.readouterr().out
+    data = json.loads(result.read_text())
+    assert data["status"] == "interrupted"
+    # The greedy choice is there from the beginning.
+    assert data["triangulation"]
+    assert not bcut.verify(result).proven_optimal
+
+
 # Verification refuses what was changed.
 
 

@@ -454,7 +454,10 @@ def test_a_separator_that_is_invalid_is_not_believed_for_a_triangulation(
         ({"time_limit": float("nan")}, "time limit nan"),
         ({"time_limit": float("inf")}, "finite number of seconds"),
         ({"seed": -1}, "seed -1"),
-        ({"method": "magic"}, "unknown method 'magic': known are auto, listing, orbits, fixing, scip"),
+        (
+            {"method": "magic"},
+            "unknown method 'magic': known are auto, listing, orbits, fixing, elimination, scip",
+        ),
         ({"formulation": "7"}, "unknown formulation '7'"),
         ({"sense": "best"}, "'min' or 'max'"),
         ({"objective": "beauty"}, "unknown objective 'beauty'"),

@@ -102,14 +102,15 @@ def subtract_products(program: CompactProgram, multipliers: NDArray[Any], reduce
     multipliers : ndarray of int64 or float64, shape (r + 1,)
     reduced : ndarray of the same type, shape (m,)
     """
+    behind = multipliers[1:] if len(multipliers) > 1 else np.zeros(1, dtype=multipliers.dtype)
     for start in range(0, len(reduced), _PIECE):
         part = slice(start, start + _PIECE)
         rows, signs = program.facet_rows[part], program.facet_signs[part]
         total = reduced[part]
         total -= np.where(program.coverage[part], multipliers[0], 0)
         for position in range(rows.shape[1]):
-            # Facets without a row have -1 there, which reads some multiplier, and the sign 0.
-            total -= multipliers[1:][rows[:, position]] * signs[:, position]
+            # Facets without a row have -1 there, which reads the last multiplier, and the sign 0.
+            total -= behind[rows[:, position]] * signs[:, position]
 
 
 def _share_to_keep(program: CompactProgram, objective: Objective, duals: NDArray[np.float64]) -> float:

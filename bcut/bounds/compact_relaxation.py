@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from bcut.bounds.columns import Columns
 from bcut.bounds.coverage_points import coverage_points
 from bcut.bounds.first_order import Program, Progress, first_order_bound
-from bcut.bounds.linear_program import LinearProgram, solve_linear_program
 from bcut.formulations.compact import CompactProgram
 from bcut.objectives.objective import Objective
 
@@ -49,6 +48,7 @@ def bound_relaxation(
     tolerance: float,
     incumbent: float | None = None,
     start: CompactDuals | None = None,
+    everything: CompactProgram | None = None,
     seconds: float | None = None,
     on_progress: Callable[[dict[str, Any]], None] | None = None,
 ) -> CompactDuals:
@@ -64,6 +64,8 @@ def bound_relaxation(
         The value of a known triangulation: the work ends as soon as it leaves few columns.
     start : CompactDuals, optional
         To start from.
+    everything : CompactProgram, optional
+        The program before it was restricted to some columns, where it was: with the same rows.
     seconds : float, optional
     on_progress : callable, optional
         Told of ``{"lp": value, "first_order": bound}``.
@@ -76,7 +78,7 @@ def bound_relaxation(
     sides = np.zeros(columns.rows)
     sides[0] = 1.0
     linear = Program(columns, costs, sides, sides.copy(), column_upper=1.0)
-    linear = linear.with_combinations(coverage_points(program))
+    linear = _with_coverage_points(linear, program if everything is None else everything)
 
     def tell(progress: Progress) -> None:
         if on_progress is not None:
@@ -105,17 +107,13 @@ def bound_relaxation(
     return CompactDuals(status, found.duals * unit, found.x, float(costs @ found.x) * unit)
 
 
-def bound_by_interior_point(
-    program: CompactProgram, objective: Objective, *, seconds: float | None = None
-) -> CompactDuals:
-    """Find multipliers by HiGHS's interior point method, without crossover."""
-    unit = float(objective.solver_unit)
-    matrix = program.matrix()
-    sides = np.zeros(matrix.shape[0])
-    sides[0] = 1.0
-    linear = LinearProgram(objective.sign * objective.solver_costs, matrix, sides, sides.copy())
-    found = solve_linear_program(linear, method="interior", seconds=seconds)
-    if found.status != "optimal":
-        zeros = np.zeros(len(sides))
-        return CompactDuals("limit", zeros, np.zeros(matrix.shape[1]), 0.0)
-    return CompactDuals("accurate", found.duals * unit, found.x, found.value * unit)
+def _with_coverage_points(linear: Program, program: CompactProgram) -> Program:
+    """Append coverage rows of further points, as far as floating point finds such points."""
+    from scipy.spatial import QhullError
+
+    if not len(program.row_faces):
+        return linear
+    try:
+        return linear.with_combinations(coverage_points(program))
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError, QhullError):
+        return linear

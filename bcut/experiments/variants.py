@@ -19,7 +19,10 @@ PRESETS = {
 _KEYS = (
     "name", "preset", "separators", "scip", "cutoff", "time_limit", "memory_limit", "seed", "method", "ledger",
 )  # fmt: skip
-_METHODS = {"loop": ("listing", "orbits"), "solve": ("auto", "listing", "orbits", "scip")}
+_METHODS = {
+    "loop": ("listing", "orbits", "fixing"),
+    "solve": ("auto", "listing", "orbits", "fixing", "elimination", "scip"),
+}
 _UNLIMITED = ":unlimited"
 
 

@@ -10,6 +10,7 @@ from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.placing import placing_triangulation
 from bcut.geometry.subsets import ranks, without
+from bcut.geometry.sweep import sweep_triangulation
 
 
 def first_triangulation(configuration: PointConfiguration, chirotope: Chirotope) -> NDArray[np.int64]:
@@ -32,6 +33,8 @@ def first_triangulation(configuration: PointConfiguration, chirotope: Chirotope)
     found = _delaunay(configuration)
     if found is not None and len(np.unique(found)) == configuration.n and is_triangulation(found, chirotope):
         return found
+    if configuration.dimension == 2:
+        return sweep_triangulation(configuration)
     return placing_triangulation(configuration, chirotope)
 
 
@@ -78,12 +81,13 @@ def is_triangulation(simplices: NDArray[np.int64], chirotope: Chirotope) -> bool
 
 def _support(facets: NDArray[np.int64], sides: NDArray[np.int64], chirotope: Chirotope) -> bool:
     """Tell whether no point lies beyond any of the facets, whose simplices are on the given sides."""
-    for point in range(chirotope.n):
-        others = (facets != point).all(axis=1)
-        joined = np.column_stack((facets[others], np.full(int(others.sum()), point)))
-        behind = (joined[:, :-1] > point).sum(axis=1)
+    points = np.arange(chirotope.n)
+    for facet, side in zip(facets, sides.tolist(), strict=True):
+        others = points[~np.isin(points, facet)]
+        joined = np.column_stack((np.tile(facet, (len(others), 1)), others))
+        behind = (facet > others[:, None]).sum(axis=1)
         signs = chirotope.orientations(np.sort(joined, axis=1)) * np.where(behind & 1, -1, 1)
-        if (signs * sides[others] < 0).any():
+        if (signs * side < 0).any():
             return False
     return True
 

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.delaunay import first_triangulation
 from bcut.geometry.elimination import Skeleton, all_pairs, diamond_edges, lmt_skeleton
-from bcut.geometry.sweep import sweep_triangulation
+from bcut.geometry.partial_chirotope import PartialChirotope
 from bcut.result import Certificate
 from bcut.solving.plane_faces import COST_ERROR, SUM_ERROR, are_disks, best_tilings, part_of, solve_face
 from bcut.solving.search import Part, Progress, Search
@@ -259,7 +260,7 @@ def _solve_faces(search: Search, skeleton: Skeleton, statistics: EliminationStat
 
 def _place(search: Search, configuration: PointConfiguration) -> None:
     """Hand out some triangulation where there was no time for the best one."""
-    simplices = sweep_triangulation(configuration)
+    simplices = first_triangulation(configuration, PartialChirotope(configuration, ()))
     nothing = np.zeros(simplices.shape, dtype=np.int64)
     search.whole = part_of(
         configuration, simplices, nothing, np.zeros((1, 2), dtype=np.int64), np.zeros(1, bool)

@@ -33,7 +33,9 @@ from bcut.solving.strategies import is_optimal, reach_targets, solve_at_once
 _TOLERANCE, _SHARPER, _SHARPEST = 1e-4, 0.1, 1e-7
 # Simplices with reduced costs up to this many times the gap of the multipliers are in the small program, and up to
 # this part of the bound, and those of which the multipliers' point has more than this.
-_GAPS, _LEAST, _IN_USE = 3.0, 1e-5, 0.01
+_GAPS, _LEAST, _IN_USE = 0.7, 1e-5, 0.01
+# Cuts without branching need more columns: the bound cannot rise above what those that are left out would cost.
+_ROOM_FOR_CUTS = 10
 # A small program that would become larger than this, and this many times larger, waits for better multipliers.
 _MOST, _GROWTH = 20_000, 2.0
 # The gap between the smallest two values, relative to the bound, from which on targets are better than a threshold.
@@ -100,10 +102,10 @@ class _Fixing:
             if not self._sharpen(_TOLERANCE):
                 search.status = "limit"
                 return
-            columns, beyond = self._cheapest(self._first_threshold())
+            columns, beyond = self._cheapest(self._threshold_for_cuts())
             child = self._child(columns)
             root = bound_at_root(child, child.whole, child.separation(child.whole))
-            self._keep(child, columns)
+            self._keep(child, columns, beyond)
             if root.last is not None:
                 search.raise_bound(min(root.last.value, beyond))
             if root.status == "limit":
@@ -124,11 +126,11 @@ class _Fixing:
         kept = np.flatnonzero(signed <= float(search.sign * search.value) * (1 + 1e-12))
         if len(kept) == len(signed):
             return
-        self.kept = kept
-        program = restricted_program(self.everything.program, kept)
-        search.whole = self.whole = CompactPart.of(program, objective.restricted_to(kept))
         assert search.columns is not None
-        search.columns = np.searchsorted(kept, np.sort(search.columns))
+        program = restricted_program(self.everything.program, kept)
+        part, columns = CompactPart.of(program, objective.restricted_to(kept)), np.sort(search.columns)
+        self.kept, self.whole = kept, part
+        search.whole, search.columns = part, np.searchsorted(kept, columns)
 
     def _end(self) -> None:
         """Speak of all columns again."""
@@ -138,7 +140,8 @@ class _Fixing:
                 search.columns = self.kept[search.columns]
             search.whole = self.everything
         search.exact = None
-        search.certificate = self._certificate(proven=False)
+        if search.status != "optimal":
+            search.certificate = self._certificate(proven=False)
 
     def _certificate(self, *, proven: bool) -> Certificate | None:
         search, everything = self.search, self.everything
@@ -182,6 +185,7 @@ class _Fixing:
                 tolerance=tolerance,
                 incumbent=None if search.value is None else float(search.sign * search.value),
                 start=self.duals,
+                everything=self.everything.program,
                 seconds=search.seconds_left,
                 on_progress=lambda facts: self._tell("multipliers", **facts),
             )
@@ -200,6 +204,8 @@ class _Fixing:
     def _tell(self, stage: str, **facts: Any) -> None:
         """Report the columns alive and the memory used."""
         search = self.search
+        if search.on_progress is None:
+            return
         count = len(self.whole.columns)
         if self.bound is not None and search.value is not None:
             count = len(self.bound.bound.columns_within(search.sign * search.value))
@@ -222,12 +228,21 @@ class _Fixing:
             threshold = min(threshold, search.sign * search.value - self.bound.bound.value)
         return threshold
 
+    def _threshold_for_cuts(self) -> Fraction:
+        """Return up to which reduced cost columns are in the program whose relaxation is cut."""
+        assert self.bound is not None
+        objective, value = self.whole.objective, self.bound.bound.value
+        if self._unit_is_large():
+            # A solution with any other column is worse than the least value that the bound allows.
+            return objective.rounded_up(value) - value
+        return _ROOM_FOR_CUTS * self._first_threshold()
+
     def _by_thresholds(self) -> None:
         search, tolerance = self.search, _TOLERANCE
         threshold = self._first_threshold()
         while True:
             columns, beyond = self._cheapest(threshold)
-            child = self._solve_on(columns)
+            child = self._solve_on(columns, beyond)
             if child.bound is not None:
                 search.raise_bound(min(child.bound, beyond))
             if child.status != "optimal":
@@ -298,23 +313,28 @@ class _Fixing:
             seconds=search.seconds,
         )
 
-    def _solve_on(self, columns: NDArray[np.intp]) -> Search:
+    def _solve_on(self, columns: NDArray[np.intp], beyond: Fraction) -> Search:
         """Find the best triangulation on some columns."""
         child = self._child(columns)
         try:
             with capped_costs(child):
                 solve_at_once(child)
         finally:
-            self._keep(child, columns)
+            self._keep(child, columns, beyond)
         return child
 
-    def _keep(self, child: Search, columns: NDArray[np.intp]) -> None:
-        """Take over what the search over some columns has found."""
+    def _keep(self, child: Search, columns: NDArray[np.intp], beyond: Fraction) -> None:
+        """Take over what the search over some columns has found.
+
+        Its relaxations are those of all columns as long as they stay below what the others would cost.
+        """
         search = self.search
         if child.columns is not None:
             search.offer(columns[child.columns])
         search.nodes += child.nodes
         search.rounds.extend(child.rounds)
         search.root_is_integral = child.root_is_integral
-        if child.lp is not None:
-            search.lp, search.lp_after_cuts = child.lp, child.lp_after_cuts
+        if child.lp is None or child.lp_after_cuts is None or search.sign * child.lp > beyond:
+            return
+        search.lp = child.lp
+        search.lp_after_cuts = search.sign * min(search.sign * child.lp_after_cuts, float(beyond))
