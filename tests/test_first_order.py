@@ -421,6 +421,20 @@ def test_orbit_programs_by_the_large_way(
     np.testing.assert_allclose(formulation.matrix @ large.point, 0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("name", "lp", "orbits"), [("cube:4", 16, None), ("cube:5", 67, 14)])
+def test_the_middle_of_the_optimal_multipliers_fixes_the_most(
+    monkeypatch: pytest.MonkeyPatch, name: str, lp: int, orbits: int | None
+) -> None:
+    formulation, objective = orbit_program(name, "min")
+    direct = orbit_root(formulation, objective, method="interior")
+    monkeypatch.setattr("bcut.bounds.orbit_root.LARGE", 1)
+    vertex, middle = (orbit_root(formulation, objective, method=m) for m in ("simplex", "interior"))
+    left = [len(root.bound.orbits_within(Fraction(lp))) for root in (direct, middle, vertex) if root.bound]
+    assert left[1] <= left[0]
+    assert left[1] <= left[2]
+    assert orbits is None or left[1] == orbits
+
+
 def test_a_limit_of_time_leaves_a_proven_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     formulation, objective = orbit_program("cube:5", "min")
     monkeypatch.setattr("bcut.bounds.orbit_root.LARGE", 1)
@@ -447,13 +461,19 @@ def test_large_programs_without_a_point() -> None:
 
 
 def test_sifting_brings_in_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From poor multipliers and very few columns, in several rounds."""
-    monkeypatch.setattr("bcut.bounds.sifting._FEWEST", 30)
+    """From multipliers that are not good enough, in several rounds."""
+    sizes = []
+
+    def counted(program: LinearProgram, **options: Any) -> Any:
+        sizes.append(len(program.costs))
+        return solve_linear_program(program, **options)
+
+    monkeypatch.setattr("bcut.bounds.sifting.solve_linear_program", counted)
     program = listed("random:18,3,seed=11")
     costs = costs_of("weights", len(program.simplices), 3)
     linear = as_program(program, costs, points=0)
-    rough = first_order_bound(linear, iterations=200, tolerance=0.0)
-    sifted = sift(linear.columns, costs, linear.lower, linear.upper, rough.duals, rough.x)
+    rough = first_order_bound(linear, iterations=680, tolerance=0.0)
+    sifted = sift(linear, rough.duals, rough.x)
     best = optimum(program.matrix(), costs, linear.lower)
     assert rough.bound < best * (1 - 1e-3)
     assert sifted is not None
@@ -461,13 +481,15 @@ def test_sifting_brings_in_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> Non
     assert sifted.x @ costs == pytest.approx(best, rel=1e-9)
     assert linear.columns.reduced(costs, sifted.duals).min() >= -1e-8
     assert sifted.duals[0] == pytest.approx(best, rel=1e-8)
+    assert len(sizes) > 1
+    assert max(sizes) < 0.7 * len(costs)
 
 
 def test_sifting_gives_up_when_time_is_over(linear: Program) -> None:
     rough = first_order_bound(linear, iterations=40)
     y = np.zeros(linear.columns.rows)
     y[: len(rough.duals)] = rough.duals
-    assert sift(linear.columns, linear.costs, linear.lower, linear.upper, y, rough.x, seconds=0.0) is None
+    assert sift(linear, y, rough.x, seconds=0.0) is None
 
 
 def test_an_interrupt_ends_a_large_program(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -67,7 +67,7 @@ def result_of(points: Sequence[Sequence[Any]], simplices: Any, /, **changes: Any
 def test_optimal_result_without_certificate_rests_on_the_solver() -> None:
     verification = verify(result_of(CUBE, CUBE_5))
     assert verification.statement == (
-        "triangulation verified, value 5; no exact bound in this file; optimality rests on the solver's tree"
+        "triangulation verified, value 5; no exact bound in this file; optimality rests on the run itself"
     )
     assert (verification.value, verification.exact_bound, verification.proven_optimal) == (5, None, False)
     assert any("face to face" in check for check in verification.checks)

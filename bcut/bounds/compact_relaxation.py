@@ -17,7 +17,7 @@ from bcut.objectives.objective import Objective
 
 # A small program is what fixing is for: once the incumbent leaves so few columns, better multipliers cost more
 # than they save.
-_FEW = 1500
+_FEW, _FEW_OF = 1500, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def bound_relaxation(
             on_progress(facts)
 
     def stop(progress: Progress) -> bool:
-        return progress.within is not None and progress.within <= _FEW
+        return progress.within is not None and progress.within <= min(_FEW, columns.count // _FEW_OF)
 
     found = first_order_bound(
         linear,

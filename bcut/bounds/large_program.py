@@ -33,7 +33,7 @@ def solve_large_program(
     program : LinearProgram
         Its rows are equations, or have one side.
     method : {"simplex", "interior"}
-        How the small programs of the sifting are solved.
+        "interior" gives multipliers in the middle of the optimal ones.
     seconds : float, optional
         Time limit.
 
@@ -69,16 +69,7 @@ def solve_large_program(
             return LpSolution("infeasible", found.x, found.duals, found.bound)
         if found.status != "converged":
             break
-        sifted = sift(
-            columns,
-            program.costs,
-            program.lower,
-            program.upper,
-            found.duals,
-            found.x,
-            method=method,
-            seconds=_left(deadline),
-        )
+        sifted = sift(large, found.duals, found.x, method=method, seconds=_left(deadline))
         if sifted is not None:
             return LpSolution("optimal", sifted.x, sifted.duals, sifted.value)
         start = (found.x, found.duals)

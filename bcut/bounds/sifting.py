@@ -15,13 +15,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.columns import Columns
 from bcut.bounds.linear_program import LinearProgram, solve_linear_program
+from bcut.bounds.repair import Floats, Program
 
 # Columns to begin with, for each column that the first-order point uses and at least, and how their number grows where
 # they do not suffice.
-_FOR_EACH, _FEWEST, _GROWTH, _MOST = 3, 1000, 4, 200_000
+_FOR_EACH, _FEWEST, _GROWTH, _MOST = 2, 16, 4, 200_000
 _ROUNDS = 12
+# Columns, at least, between whose multipliers the middle is sought; how far to go of the way that is possible.
+_CENTRE, _SHARE, _ZERO = 1000, 0.9, 1e-7
+# Entries of x below this, relative to the largest, are not meant.
+_USED = 1e-4
 # Reduced costs below this, relative to the costs, are negative.
 _TOLERANCE = 1e-9
 
@@ -38,36 +42,30 @@ class Sifted:
     """
 
     value: float
-    x: NDArray[np.float64]
-    duals: NDArray[np.float64]
+    x: Floats
+    duals: Floats
 
 
 def sift(
-    columns: Columns,
-    costs: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-    duals: NDArray[np.float64],
-    x: NDArray[np.float64],
+    program: Program,
+    duals: Floats,
+    x: Floats,
     *,
     method: Literal["simplex", "interior"] = "simplex",
     seconds: float | None = None,
 ) -> Sifted | None:
-    """Minimise ``costs @ x`` over ``lower <= A x <= upper``, x >= 0, starting from nearly optimal multipliers.
+    """Solve a program to optimality, starting from nearly optimal multipliers.
 
     Parameters
     ----------
-    columns : Columns
-        A.
-    costs : ndarray of float, shape (m,)
-    lower, upper : ndarray of float, shape (rows,)
-        Rows are equations, or have one side.
+    program : Program
+        Its rows are equations, or have one side.
     duals : ndarray of float, shape (rows,)
         Of signs that the rows allow.
     x : ndarray of float, shape (m,)
         Tells by its largest entries which columns to begin with, besides those with the least reduced costs.
     method : {"simplex", "interior"}
-        How the small programs are solved.
+        "interior" moves the multipliers away from the boundary of the set of optimal ones.
     seconds : float, optional
 
     Returns
@@ -76,69 +74,98 @@ def sift(
         None where the time, the rounds or the columns did not suffice.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
-    y = np.array(duals, dtype=float)
-    reduced = columns.reduced(costs, y)
-    used = np.flatnonzero(x > 1e-4 * np.max(x, initial=0.0))
+    columns, costs = program.columns, program.costs
+    reduced = columns.reduced(costs, duals)
+    used = np.flatnonzero(x > _USED * np.max(x, initial=0.0))
     size = min(columns.count, max(_FEWEST, _FOR_EACH * len(used)))
-    chosen = np.union1d(used, np.argpartition(reduced, size - 1)[:size])
+    chosen = np.union1d(used, _least(reduced, size))
     tolerance = _TOLERANCE * max(float(np.abs(costs).max(initial=0.0)), 1e-300)
     for _ in range(_ROUNDS):
-        left = None if deadline is None else deadline - time.monotonic()
-        if left is not None and left <= 0:
-            return None
-        step = _change(columns.restricted_to(chosen), reduced[chosen], (lower, upper), y, method, left)
-        if step == "limit":
+        step = _change(program, chosen, reduced[chosen], duals, "simplex", deadline)
+        if step == "limit" or (step == "infeasible" and len(chosen) == columns.count):
             return None
         if step == "infeasible":
             size = min(columns.count, _GROWTH * size)
             if size > _MOST:
                 return None
-            chosen = np.union1d(chosen, np.argpartition(reduced, size - 1)[:size])
+            chosen = np.union1d(chosen, _least(reduced, size))
             continue
         weights, change = step
-        trial = y + change
-        priced = columns.reduced(costs, trial)
+        priced = columns.reduced(costs, duals + change)
         entering = np.flatnonzero(priced < -tolerance)
         if not len(np.setdiff1d(entering, chosen)):
             point = np.zeros(columns.count)
             point[chosen] = weights
-            return Sifted(float((costs[chosen] * weights).sum()), point, trial)
-        if len(entering) > size:
-            entering = entering[np.argpartition(priced[entering], size - 1)[:size]]
-        chosen = np.union1d(chosen, entering)
+            found = duals + change
+            if method == "interior":
+                found += _towards_the_middle(program, priced, found, tolerance, deadline)
+            return Sifted(float((costs[chosen] * weights).sum()), point, found)
+        chosen = np.union1d(chosen, entering[_least(priced[entering], min(size, len(entering)))])
+        size = min(columns.count, 2 * size)
     return None
 
 
+def _least(values: Floats, count: int) -> NDArray[np.intp]:
+    """Return the places of the least values."""
+    return np.argpartition(values, count - 1)[:count]
+
+
+def _towards_the_middle(
+    program: Program, reduced: Floats, duals: Floats, tolerance: float, deadline: float | None
+) -> Floats:
+    """Return a change of optimal multipliers, with these reduced costs, that leaves fewer of them zero.
+
+    Multipliers in the middle of the set that is optimal for the columns with the least reduced costs have the same
+    value, and so has all between them and these; how far one may go, the other columns tell.
+    """
+    columns = program.columns
+    size = min(columns.count, max(_CENTRE, 2 * int((reduced < _ZERO).sum())))
+    if size > _MOST:
+        return np.zeros(len(duals))
+    least = np.sort(_least(reduced, size))
+    step = _change(program, least, np.maximum(reduced[least], 0.0), duals, "interior", deadline)
+    if isinstance(step, str):
+        return np.zeros(len(duals))
+    _, change = step
+    loss = -columns.reduced(np.zeros(columns.count), change)
+    losing = np.flatnonzero(loss > 0)
+    rates = (np.maximum(reduced[losing], 0.0) + tolerance) / loss[losing]
+    return min(1.0, _SHARE * float(rates.min(initial=np.inf))) * change
+
+
 def _change(
-    columns: Columns,
-    costs: NDArray[np.float64],
-    sides: tuple[NDArray[np.float64], NDArray[np.float64]],
-    y: NDArray[np.float64],
+    program: Program,
+    chosen: NDArray[np.intp],
+    costs: Floats,
+    y: Floats,
     method: Literal["simplex", "interior"],
-    seconds: float | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | Literal["infeasible", "limit"]:
+    deadline: float | None,
+) -> tuple[Floats, Floats] | Literal["infeasible", "limit"]:
     """Solve the program on some columns, with their reduced costs for y; return x and the change of y.
 
     An inequality becomes an equation with a slack variable, whose reduced cost is that of any column.
     """
     import scipy.sparse as sp
 
-    lower, upper = sides
-    matrix = columns.sparse().tocsr().astype(float)
+    seconds = None if deadline is None else deadline - time.monotonic()
+    if seconds is not None and seconds <= 0:
+        return "limit"
+    lower, upper = program.lower, program.upper
+    matrix = program.columns.restricted_to(chosen).sparse().tocsr().astype(float)
     met = np.flatnonzero((np.diff(matrix.indptr) > 0) | (lower > 0) | (upper < 0))
     loose = np.flatnonzero(lower[met] != upper[met])
     right = np.where(np.isfinite(lower), lower, upper)[met]
     signs = np.where(np.isfinite(lower), -1.0, 1.0)[met[loose]]
     slacks = sp.csr_array((signs, (loose, np.arange(len(loose)))), shape=(len(met), len(loose)))
-    program = LinearProgram(
+    small = LinearProgram(
         np.concatenate((costs, -signs * y[met[loose]])),
         sp.hstack((matrix[met], slacks), format="csr"),
         right,
         right,
     )
-    solution = solve_linear_program(program, method=method, seconds=seconds)
+    solution = solve_linear_program(small, method=method, seconds=seconds)
     if solution.status != "optimal":
         return solution.status
     change = np.zeros(len(y))
     change[met] = solution.duals
-    return solution.x[: columns.count], change
+    return solution.x[: len(chosen)], change

@@ -99,7 +99,7 @@ class _Fixing:
         search = self.search
         try:
             self._start()
-            if not self._sharpen(_TOLERANCE):
+            if not self._sharpen(_TOLERANCE, fixing=False):
                 search.status = "limit"
                 return
             columns, beyond = self._cheapest(self._threshold_for_cuts())
@@ -175,15 +175,18 @@ class _Fixing:
         else:
             self._by_thresholds()
 
-    def _sharpen(self, tolerance: float) -> bool:
-        """Find multipliers and prove their bound; tell whether there was time for the accuracy asked for."""
+    def _sharpen(self, tolerance: float, *, fixing: bool = True) -> bool:
+        """Find multipliers and prove their bound; tell whether there was time for the accuracy asked for.
+
+        With `fixing`, less accuracy will do once the triangulation known leaves few columns.
+        """
         search, whole = self.search, self.whole
         with search.timed("multipliers"):
             duals = bound_relaxation(
                 whole.program,
                 whole.objective,
                 tolerance=tolerance,
-                incumbent=None if search.value is None else float(search.sign * search.value),
+                incumbent=float(search.sign * search.value) if fixing and search.value is not None else None,
                 start=self.duals,
                 everything=self.everything.program,
                 seconds=search.seconds_left,

@@ -408,7 +408,9 @@ class _Verifier:
                 f"so the value is optimal up to a relative gap of {float(relative_gap(value, best)):.1e}"
             )
         else:
-            parts.append("optimality rests on the solver's tree")
+            # With a bound, what is left is the search between it and the value.
+            rest = "run itself" if best is None else "solver's tree"
+            parts.append(f"optimality rests on the {rest}")
         return "; ".join(parts)
 
     def _bound_statement(
