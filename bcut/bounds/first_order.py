@@ -3,8 +3,8 @@
 The method needs nothing but products with the matrix (`bcut.bounds.halpern`), and multipliers become bounds by a small
 repair (`bcut.bounds.repair`). What makes the difference on cocircuit rows is a third thing: only one of them is not
 homogeneous, and what it says has to travel from simplex to simplex, one in each iteration. Combinations of the rows
-that say the same at many places (`bcut.bounds.coverage_points`) divide the number of iterations by five to thirty.
-Their multipliers are turned back into those of the rows.
+that say the same at many places (`bcut.bounds.coverage_points`) divide the number of iterations by two to thirteen
+(benchmarks/README.md). Their multipliers are turned back into those of the rows.
 
 All in floating-point numbers: `bcut.bounds.safe` proves what the multipliers are worth.
 """
