@@ -477,7 +477,7 @@ def test_a_combination_is_only_as_optimal_as_its_last_objective() -> None:
     checked = verify(data)
     assert not checked.proven_optimal
     assert checked.further[0].exact_bound is None
-    assert "optimality rests on the solver's tree" in checked.statement
+    assert "optimality rests on the run itself" in checked.statement
 
 
 def test_a_threshold_that_is_not_proven_is_not_written() -> None:
