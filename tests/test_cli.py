@@ -20,8 +20,8 @@ import pytest
 import bcut
 from bcut.cli.main import bcut as program
 from bcut.cli.main import run
-from bcut.solving.api import DEFAULT_SEPARATORS
 from bcut.solving.methods import METHODS
+from bcut.solving.run import DEFAULT_SEPARATORS
 
 Captured = pytest.CaptureFixture[str]
 

@@ -168,7 +168,8 @@ def safe_orbit_bound(
     volumes, volume = formulation.volumes, formulation.volume
     largest = max(map(abs, volumes.tolist()))
     small = volumes.dtype == np.int64 and abs(volume) < _LARGE and largest < _LARGE
-    shift = _shift(formulation, objective, duals, coverage)
+    columns = _columns(formulation)
+    shift = _shift(columns, objective, duals, coverage)
     denominator = (1 << shift) * (1 if small else abs(volume))
     unit = denominator >> shift
     multipliers = np.rint(np.nan_to_num(duals) * 2.0**shift).astype(np.int64)
@@ -177,9 +178,9 @@ def safe_orbit_bound(
     share = Fraction(float(np.nan_to_num(coverage))) * denominator / largest
     cover = round(share)
     if small and objective.fits_64_bits:
-        reduced = _costs(objective, denominator) - _columns(formulation).T @ multipliers
+        reduced = _costs(objective, denominator) - columns.T @ multipliers
     else:
-        products = _columns(formulation).T @ multipliers
+        products = columns.T @ multipliers
         multipliers = multipliers.astype(object) * unit
         reduced = _costs(objective, denominator).astype(object) - products.astype(object) * unit
     bounds = [_with_coverage(formulation, reduced, cover)]
@@ -229,13 +230,11 @@ def _costs(objective: Objective, denominator: int) -> NDArray[Any]:
     return np.array(values, dtype=np.int64 if fits else object)
 
 
-def _shift(
-    formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
-) -> int:
+def _shift(columns: sp.csr_matrix, objective: Objective, duals: NDArray[np.floating], coverage: float) -> int:
     """Return the largest shift up to `SHIFT` for which a reduced cost stays below 2**61."""
     sizes = np.abs(np.nan_to_num(duals))
     size = float(np.abs(objective.costs).max(initial=1.0)) + 2 * abs(float(np.nan_to_num(coverage)))
-    size += float((abs(_columns(formulation)).T @ sizes).max(initial=0.0)) + float(sizes.max(initial=0.0))
+    size += float((abs(columns).T @ sizes).max(initial=0.0)) + float(sizes.max(initial=0.0))
     shift = SHIFT
     while shift > 0 and size * 2.0**shift >= 2.0**61:
         shift -= 1

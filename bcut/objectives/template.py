@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from bcut.errors import InputError
-from bcut.files.atomic import write_new
+from bcut.files.templates import check_name, file_name, write_file
 from bcut.objectives.measures import MEASURES
 
 _TEMPLATE = '''\
@@ -41,14 +40,10 @@ def template(name: str) -> str:
     InputError
         If the name is of another form, or that of a built-in measure.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
-        raise InputError(
-            f"objective name '{name}': write words of lower-case letters and digits, joined by hyphens, such as "
-            "longest-edge"
-        )
+    check_name("objective", name, "longest-edge")
     if name in MEASURES:
         raise InputError(f"objective name '{name}': a built-in measure has it; take another one")
-    return _TEMPLATE.format(name=name, file=_file_name(name), function=name.replace("-", "_"))
+    return _TEMPLATE.format(name=name, file=file_name(name), function=name.replace("-", "_"))
 
 
 def write_template(name: str, directory: Path) -> Path:
@@ -59,11 +54,4 @@ def write_template(name: str, directory: Path) -> Path:
     InputError
         If the name does not do, the file exists already, or it cannot be written.
     """
-    text = template(name)
-    path = directory / _file_name(name)
-    write_new(path, text)
-    return path
-
-
-def _file_name(name: str) -> str:
-    return name.replace("-", "_") + ".py"
+    return write_file(name, template(name), directory)

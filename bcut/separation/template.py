@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from bcut.errors import InputError
-from bcut.files.atomic import write_new
+from bcut.files.templates import check_name, file_name, write_file
 from bcut.separation.resolve import built_in_names
 
 _TEMPLATE = '''\
@@ -60,15 +59,11 @@ def template(name: str) -> str:
     InputError
         If the name is of another form, or that of a built-in family.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
-        raise InputError(
-            f"separator name '{name}': write words of lower-case letters and digits, "
-            "joined by hyphens, such as my-cuts"
-        )
+    check_name("separator", name, "my-cuts")
     if name in built_in_names():
         raise InputError(f"separator name '{name}': a built-in family has it; take another one")
     class_name = "".join(word.capitalize() for word in name.split("-"))
-    return _TEMPLATE.format(name=name, file=_file_name(name), class_name=class_name)
+    return _TEMPLATE.format(name=name, file=file_name(name), class_name=class_name)
 
 
 def write_template(name: str, directory: Path) -> Path:
@@ -79,11 +74,4 @@ def write_template(name: str, directory: Path) -> Path:
     InputError
         If the name does not do, the file exists already, or it cannot be written.
     """
-    text = template(name)
-    path = directory / _file_name(name)
-    write_new(path, text)
-    return path
-
-
-def _file_name(name: str) -> str:
-    return name.replace("-", "_") + ".py"
+    return write_file(name, template(name), directory)

@@ -206,6 +206,8 @@ class _OrbitProgram:
         total: dict[int, Fraction] = {}
         for cut in certificate.cuts:
             assert simplices is not None
+            if not cut.multiplier:
+                continue  # nobody has looked at its simplices
             for simplex, coefficient in zip(cut.simplices, cut.coefficients, strict=True):
                 number = simplices.number_of(simplex)
                 share = cut.multiplier * coefficient / simplices.sizes[number - 1]

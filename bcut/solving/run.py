@@ -1,0 +1,315 @@
+"""One run of `solve` or `bound`: its checked input, its search, and the result made from it."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from bcut.errors import InputError, SeparatorLoadError
+from bcut.geometry.configuration import PointConfiguration
+from bcut.geometry.permutations import PermutationGroup
+from bcut.geometry.restrictions import Restrictions
+from bcut.geometry.symmetry import symmetry_group
+from bcut.instance import load_instance
+from bcut.objectives.invariance import symmetries_of_table
+from bcut.objectives.measures import read_costs
+from bcut.objectives.objective import objective_of
+from bcut.objectives.syntax import read_level, read_objective
+from bcut.result import Certificate, Question, Result
+from bcut.separation.driver import check_names
+from bcut.separation.resolve import resolve
+from bcut.separation.seam import Separator
+from bcut.solving.bottleneck import solve_bottleneck
+from bcut.solving.by_elimination import empty_part, solve_by_elimination
+from bcut.solving.by_fixing import bound_by_fixing, solve_by_fixing
+from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
+from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
+from bcut.solving.compact_part import begin_fixing, make_program
+from bcut.solving.embedding import costs_to_embed
+from bcut.solving.groups import GroupLike, subgroups_to_try, symmetries_of
+from bcut.solving.levels import Levels, solve_listed
+from bcut.solving.memory import Watch, watched
+from bcut.solving.methods import Traits, check_method, choose_method
+from bcut.solving.orbit_stage import OrbitStage, orbit_stage
+from bcut.solving.programs import formulation_name, make_formulation
+from bcut.solving.report import make_result
+from bcut.solving.search import Part, Progress, Search, bound_at_root
+from bcut.solving.strategies import solve_in_scip
+
+DEFAULT_SEPARATORS = ("link",)
+# Relaxations of stable sets are so weak that cliques close most of their gaps; link cuts are not valid for dissections.
+SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
+SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
+
+InstanceLike = str | os.PathLike[str] | PointConfiguration
+SeparatorLike = str | Separator | type[Separator]
+
+
+class Run:
+    """One run; the parameters are those of `bcut.solving.api.solve`."""
+
+    def __init__(
+        self,
+        instance: InstanceLike,
+        objective: str,
+        sense: str | None,
+        formulation: str | None,
+        spanning: bool,
+        separators: Sequence[SeparatorLike] | None,
+        time_limit: float | None,
+        memory_limit: float | None,
+        seed: int,
+        method: str,
+        on_progress: Progress | None,
+        *,
+        then: Sequence[str] = (),
+        symmetries: GroupLike | None = None,
+        invariant_under: int | GroupLike | None = None,
+        dissection: bool = False,
+        restrictions: dict[str, Any] | None = None,
+        only_bound: bool = False,
+    ) -> None:
+        self.started = time.perf_counter()
+        formulation = formulation_name(formulation, dissection=dissection)
+        _check_options(time_limit, memory_limit, seed)
+        self.name = read_objective(objective, sense)
+        sense = self.name.sense
+        following = [read_level(text) for text in then]
+        given = _default_separators(formulation, dissection) if separators is None else tuple(separators)
+        families_given = [_make(item) for item in given]
+        check_names(families_given)
+        deadline = None if time_limit is None else time.monotonic() + time_limit
+        self.configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
+        started = time.perf_counter()
+        self.restrictions = Restrictions.of(self.configuration, **(restrictions or {}))
+        self.whole_question = formulation == "2" and not self.restrictions
+        grouped = symmetries is not None or invariant_under is not None
+        if grouped and method not in ("auto", "orbits"):
+            raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
+        self.method = "orbits" if grouped else method
+        check_method(self.method, self.name, following)
+        self.subgroups: list[PermutationGroup] | None = None
+        families = {_describe(item).split(":")[0] for item in given}
+        self.link, self.only_link = "link" in families, families <= {"link"}
+        traits = Traits(
+            self.configuration,
+            self.name,
+            spanning=spanning,
+            whole_question=self.whole_question,
+            only_link=self.only_link,
+            following=bool(following),
+            symmetries=lambda: symmetry_group(self.configuration).order,
+            only_bound=only_bound,
+        )
+        self.method = choose_method(self.method, traits)
+        self.spanning, self.memory_limit = spanning, memory_limit
+        self.stage = self._orbits(objective, sense, spanning, time_limit, symmetries)
+        if self.stage is not None and invariant_under is not None:
+            self.subgroups = subgroups_to_try(
+                self.configuration, self.stage.group, invariant_under, seed=seed
+            )
+        if self.method == "fixing":
+            # The program itself is made when limits are watched.
+            whole, self.size = begin_fixing(self.configuration, self.name, spanning=spanning), (0, 0)
+        elif self.method == "elimination":
+            whole, self.size = empty_part(self.configuration), (0, 0)
+        elif self.stage is None:
+            listed = make_formulation(
+                formulation,
+                self.configuration,
+                spanning=spanning,
+                dissection=dissection,
+                restrictions=self.restrictions,
+            )
+            if listed.dissection and not listed.chirotope.is_general:
+                _check_valid_for_dissections(families_given)
+            whole = Part.whole(listed, objective_of(self.name, listed))
+            self.size = listed.size
+        else:
+            whole = known_triangulation(self.stage)
+            self.size = (int(self.stage.formulation.sizes.sum()), self.stage.formulation.matrix.shape[0] + 1)
+        self.search = Search(
+            whole=whole,
+            make_separators=lambda: [_make(item) for item in given],
+            deadline=deadline,
+            seed=seed,
+            on_progress=on_progress,
+            restricted=bool(self.restrictions),
+        )
+        self.levels = Levels(self.search, following) if following else None
+        self.search.seconds["model"] = time.perf_counter() - started
+        self.question = Question(
+            objective=objective,
+            sense=sense,
+            spanning=spanning,
+            formulation=formulation,
+            separators=[_describe(item) for item in given],
+            seed=seed,
+            limits={"time": time_limit, "memory": memory_limit},
+            method=self.method,
+            invariant_under=None
+            if self.subgroups is None
+            else [subgroup.generators.tolist() for subgroup in self.subgroups],
+            dissection=dissection,
+            require=[list(face) for face in self.restrictions.require],
+            forbid=[list(face) for face in self.restrictions.forbid],
+            star=self.restrictions.star,
+        )
+
+    def _orbits(
+        self,
+        objective: str,
+        sense: str,
+        spanning: bool,
+        seconds: float | None,
+        symmetries: GroupLike | None,
+    ) -> OrbitStage | None:
+        """Return the stage over orbits where that is the method."""
+        if self.method != "orbits":
+            return None
+        group = symmetries_of(self.configuration, symmetries)
+        if objective != "cardinality":
+            default, table = read_costs(Path(objective.partition(":")[2]), self.configuration)
+            group = symmetries_of_table(group, default, table)
+        return orbit_stage(
+            self.configuration, objective, sense=sense, spanning=spanning, group=group, seconds=seconds
+        )
+
+    def within_limits(self, work: Callable[[], None]) -> None:
+        """Do the work until it is done, a limit is reached, or Ctrl-C comes."""
+        search = self.search
+        watch = Watch()
+        try:
+            with watched(watch, memory=self.memory_limit, deadline=search.deadline):
+                work()
+        except KeyboardInterrupt:
+            search.status = "interrupted"
+        except MemoryError:
+            search.status = "limit"
+        if watch.reached and search.status == "interrupted":
+            search.status = "limit"
+
+    def solve(self) -> None:
+        """Search for an optimum."""
+        if self.stage is not None:
+            if self.subgroups is None:
+                solve_by_orbits(self.search, self.stage, cuts=self.link)
+            else:
+                solve_invariant(self.search, self.stage, self.subgroups, cuts=self.link)
+        elif self.method == "scip":
+            solve_in_scip(self.search)
+        elif self.method == "fixing":
+            self.size = make_program(self.search, self.name, only_link=self.only_link)
+            solve_by_fixing(self.search)
+        elif self.method == "elimination":
+            self.size = solve_by_elimination(self.search).size
+        elif self.levels is not None:
+            self.levels.solve()
+        else:
+            solve_listed(self.search)
+
+    def bound(self) -> None:
+        """Bound at the root only."""
+        search = self.search
+        if self.stage is not None:
+            bound_by_orbits(search, self.stage, cuts=self.link)
+            search.status = "limit" if search.bound is None else "bound"
+            return
+        if self.method == "fixing":
+            self.size = make_program(search, self.name, only_link=self.only_link)
+            bound_by_fixing(search)
+            return
+        if self.name.is_bottleneck:
+            solve_bottleneck(search, branching=False)
+            return
+        root = bound_at_root(search, search.whole, search.separation(search.whole))
+        if root.status == "infeasible":
+            search.status = "infeasible"
+        search.exact = root.first
+        if root.last is not None:
+            search.raise_bound(root.last.value)
+        if root.status == "limit":
+            search.status = "limit"
+
+    def finish(self) -> Result:
+        """Verify what was found and write it down."""
+        certificate = self.certificate()
+        if self.levels is not None:
+            self.levels.conclude()
+        self.question.costs = costs_to_embed(
+            self.name, self.search.whole.objective, self.configuration, self.search
+        )
+        if self.levels is not None:
+            self.question.then = self.levels.questions(self.configuration)
+        result = make_result(
+            self.configuration,
+            self.question,
+            self.search,
+            size=self.size,
+            certificate=certificate,
+            started=self.started,
+        )
+        if self.levels is not None:
+            result.then = self.levels.records()
+        return result
+
+    def certificate(self) -> Certificate:
+        """Write out the multipliers of the exact bound without cuts."""
+        exact = self.search.exact
+        if self.search.certificate is not None:
+            return self.search.certificate
+        if self.search.status == "infeasible" and not self.question.dissection:
+            return self._proof_of_infeasibility()
+        if exact is None:
+            return Certificate(reason="no relaxation was solved to optimality outside SCIP")
+        whole, refutation = self.search.whole, self.search.refutation
+        return make_certificate(whole.formulation, whole.objective, exact, refutation)
+
+    def _proof_of_infeasibility(self) -> Certificate:
+        program = self.search.whole.formulation
+        if program.name != "2":
+            program = make_formulation(
+                "2", self.configuration, spanning=program.spanning, restrictions=self.restrictions
+            )
+        return make_infeasibility_certificate(program)
+
+
+def _check_options(time_limit: float | None, memory_limit: float | None, seed: int) -> None:
+    if time_limit is not None and not 0 <= time_limit < inf:
+        raise InputError(f"time limit {time_limit}: give a finite number of seconds that is not negative")
+    if memory_limit is not None and not 0 < memory_limit < inf:
+        raise InputError(f"memory limit {memory_limit}: give a finite positive number of GiB")
+    if seed < 0:
+        raise InputError(f"seed {seed}: give an integer that is not negative")
+
+
+def _default_separators(formulation: str, dissection: bool) -> tuple[str, ...]:
+    if dissection:
+        return SEPARATORS_FOR_DISSECTIONS
+    return SEPARATORS_FOR_STABLE_SETS if formulation in ("0", "1") else DEFAULT_SEPARATORS
+
+
+def _check_valid_for_dissections(separators: Sequence[Separator]) -> None:
+    for separator in separators:
+        if not separator.dissections:
+            raise InputError(
+                f"separator '{separator.name}' makes cuts that triangulations satisfy, but dissections need not; leave "
+                "it out (families for dissections set 'dissections = True')"
+            )
+
+
+def _make(item: SeparatorLike) -> Separator:
+    if isinstance(item, str):
+        return resolve(item)
+    made: Any = item() if isinstance(item, type) else item
+    if not isinstance(made, Separator):
+        raise SeparatorLoadError(f"{item!r} is no separator: give a name, a file, or a bcut.Separator")
+    return made
+
+
+def _describe(item: SeparatorLike) -> str:
+    return item if isinstance(item, str) else item.name
