@@ -110,3 +110,12 @@ def test_tampering_is_refused(change: Callable[[Data], None], reason: str) -> No
 def test_a_malformed_refutation_is_named() -> None:
     with pytest.raises(ResultError, match=r"certificate\.refutes\.stages"):
         bcut.verify(tampered(lambda refutes: refutes.update(stages=3)))
+
+
+def test_stages_prove_nothing_of_dissections() -> None:
+    # Their rows and cuts are those of triangulations, which dissections need not satisfy.
+    data = copy.deepcopy(bcut.solve("pentagon-center", objective=COSTS, dissection=True).to_dict())
+    bcut.verify(data)
+    data["certificate"]["refutes"] = copy.deepcopy(pentagon().to_dict())["certificate"]["refutes"]
+    with pytest.raises(VerificationError, match="rows that triangulations satisfy"):
+        bcut.verify(data)
