@@ -96,7 +96,7 @@ class _Run:
         self.configuration = PointConfiguration.from_values(
             task["instance"]["points"], name=task["instance"]["name"]
         )
-        self.started = time.perf_counter()
+        self.started, self.processor = time.perf_counter(), time.process_time()
         self.recorder: Recorder | None = None
         self.ledger: bytes | None = None
 
@@ -274,6 +274,7 @@ class _Run:
     def _seconds(self, *, lp: float, own: Mapping[str, Any], aside: float = 0.0) -> dict[str, float]:
         return {
             "total": time.perf_counter() - self.started - self._recording - aside,
+            "processor": time.process_time() - self.processor - self._recording - aside,
             "lp": max(0.0, lp),
             "separation": sum(entry["seconds"] for entry in own.values()),
         }

@@ -32,7 +32,8 @@ _TITLES = {
 # How columns are shown; others as they are.
 _SHARES = {"gap_closed", "least", "alone", "without", "gain_alone", "loss_without", "share"}
 _TIMES = {
-    "seconds", "seconds_lp", "seconds_separation", "seconds_elsewhere", "seconds_alone", "seconds_without", "factor",
+    "seconds", "processor_seconds", "seconds_lp", "seconds_separation", "seconds_elsewhere", "seconds_alone",
+    "seconds_without", "factor",
 }  # fmt: skip
 _HIDDEN = {"fingerprint", "trace"}
 

@@ -64,6 +64,11 @@ class Run:
         return float(self.outcome["seconds"]["total"])
 
     @property
+    def processor_seconds(self) -> float:
+        """Processor time of the run: what can be compared when the machine had other work too."""
+        return float(self.outcome["seconds"]["processor"])
+
+    @property
     def is_root(self) -> bool:
         """Whether the run is about a root bound."""
         return self.record["settings"]["preset"] in _ROOT_PRESETS

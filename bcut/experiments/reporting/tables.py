@@ -61,6 +61,7 @@ def runs_table(experiment: Experiment) -> Table:
                 "seconds": run.seconds,
                 "seconds_lp": outcome["seconds"]["lp"],
                 "seconds_separation": outcome["seconds"]["separation"],
+                "processor_seconds": run.processor_seconds,
                 "fingerprint": run.entry["fingerprint"],
             }
         )
@@ -85,6 +86,9 @@ def variants_table(experiment: Experiment) -> Table:
                 "gap_closed": mean(closed),
                 "settled": sum(run.settled for run in runs),
                 "seconds": shifted_geometric_mean([run.seconds for run in runs], SHIFT_SECONDS),
+                "processor_seconds": shifted_geometric_mean(
+                    [run.processor_seconds for run in runs], SHIFT_SECONDS
+                ),
                 "nodes": None
                 if in_root
                 else shifted_geometric_mean([float(run.outcome["nodes"]) for run in runs], SHIFT_NODES),
@@ -265,7 +269,7 @@ def profile_table(experiment: Experiment) -> Table:
 
 
 def _times(experiment: Experiment, names: list[str]) -> list[dict[str, float]]:
-    """Return the seconds of the variants that settled each problem, for problems that all of them have run."""
+    """Return processor seconds of the variants that settled each problem, for problems that all have run."""
     by_problem: dict[tuple[str, str, str, bool], dict[str, Run]] = {}
     for run in experiment.runs:
         entry = run.entry
@@ -274,7 +278,7 @@ def _times(experiment: Experiment, names: list[str]) -> list[dict[str, float]]:
     found = []
     for runs in by_problem.values():
         if all(name in runs for name in names):
-            settled = {name: max(runs[name].seconds, 1e-3) for name in names if runs[name].settled}
+            settled = {name: max(runs[name].processor_seconds, 1e-3) for name in names if runs[name].settled}
             if settled:
                 found.append(settled)
     return found
