@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import inspect
-import sys
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.errors import ObjectiveError, ObjectiveLoadError
+from bcut.files.plugins import guarded, import_file
 from bcut.geometry.configuration import PointConfiguration
 from bcut.objectives.registry import Costs, Ratios, Simplices
 from bcut.objectives.syntax import MeasureName
@@ -48,7 +46,7 @@ def costs_of_function(text: str, configuration: PointConfiguration, simplices: S
     # Fancy indexing makes a fresh array, which the function may do with as it likes.
     coordinates = configuration.floats[simplices]
     name = getattr(function, "__name__", "function")
-    result = _guarded(text, f"{name}()", lambda: np.asarray(function(coordinates)))
+    result = guarded(lambda: np.asarray(function(coordinates)), ObjectiveError, text, f"{name}()")
     return _checked(text, name, result, simplices)
 
 
@@ -64,18 +62,12 @@ def load_function(text: str) -> Callable[[NDArray[np.float64]], Any]:
     """
     name = MeasureName.parse(text)
     path = Path(name.source)
-    if not path.is_file():
-        raise ObjectiveLoadError(f"objective file {path}: there is no such file")
-    if path.suffix != ".py":
-        raise ObjectiveLoadError(f"objective file {path}: not a Python file; its name must end in .py")
-    module_name = f"bcut_user_objective_{abs(hash(path.resolve()))}"
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    if spec is None or spec.loader is None:
-        raise ObjectiveLoadError(f"objective file {path}: Python cannot import it")
-    module = importlib.util.module_from_spec(spec)
-    loader = spec.loader
-    sys.modules[module_name] = module  # dataclasses and pickling look their module up
-    _guarded(str(path), "loading it", lambda: loader.exec_module(module))
+    module = import_file(
+        path,
+        "objective",
+        ObjectiveLoadError,
+        lambda load: guarded(load, ObjectiveError, str(path), "loading it"),
+    )
     return _function_of(module, path, name.argument)
 
 
@@ -130,12 +122,3 @@ def _checked(text: str, name: str, result: NDArray[Any], simplices: Simplices) -
             f"{name}() returned {costs[first]} for simplex {simplices[first].tolist()}; a cost is a finite number",
         )
     return costs
-
-
-def _guarded(source: str, what: str, action: Callable[[], Any]) -> Any:
-    """Run a user's own code; what it raises becomes an `ObjectiveError` with its traceback."""
-    try:
-        return action()
-    except (Exception, SystemExit) as error:  # a script that is no objective may well call sys.exit()
-        trace = "".join(traceback.format_exception(error))
-        raise ObjectiveError(source, f"{what} raised {type(error).__name__}: {error}", trace) from error

@@ -10,21 +10,22 @@ from __future__ import annotations
 import difflib
 import importlib
 import importlib.metadata
-import importlib.util
 import inspect
 import pkgutil
 import re
-import sys
-import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.files.plugins import guarded, import_file
 from bcut.separation.seam import Separator
 
 GROUP = "bcut.separators"
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -154,18 +155,7 @@ def _from_entry_point(entry: importlib.metadata.EntryPoint) -> type[Separator]:
 
 def _class_from_file(specification: Specification) -> type[Separator]:
     path = Path(specification.source)
-    if not path.is_file():
-        raise SeparatorLoadError(f"separator file {path}: there is no such file")
-    if path.suffix != ".py":
-        raise SeparatorLoadError(f"separator file {path}: not a Python file; its name must end in .py")
-    name = f"bcut_user_separator_{abs(hash(path.resolve()))}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise SeparatorLoadError(f"separator file {path}: Python cannot import it")
-    module = importlib.util.module_from_spec(spec)
-    loader = spec.loader
-    sys.modules[name] = module  # dataclasses and pickling look their module up
-    _guarded(str(path), lambda: loader.exec_module(module))
+    module = import_file(path, "separator", SeparatorLoadError, lambda load: _guarded(str(path), load))
     if specification.class_name is None:
         return _only_class(module, str(path))
     family = getattr(module, specification.class_name, None)
@@ -238,10 +228,6 @@ def _convert(text: str, default: Any, what: str) -> Any:
         raise SeparatorLoadError(f"{what} is of type {kind.__name__}, not '{text}'") from None
 
 
-def _guarded(source: str, action: Any) -> Any:
+def _guarded(source: str, action: Callable[[], Result]) -> Result:
     """Run a plug-in's own code; what it raises becomes a `SeparatorError` with its traceback."""
-    try:
-        return action()
-    except (Exception, SystemExit) as error:  # a script that is no separator may well call sys.exit()
-        text = "".join(traceback.format_exception(error))
-        raise SeparatorError(source, f"loading it raised {type(error).__name__}: {error}", text) from error
+    return guarded(action, SeparatorError, source, "loading it")
