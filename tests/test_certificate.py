@@ -23,7 +23,8 @@ from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.objectives.objective import make_objective
 from bcut.solving.certificates import make_certificate
-from bcut.verification.certificate import CertificateData, certified_bound
+from bcut.verification.certificate import certified_bound
+from bcut.verification.certificate_data import CertificateData
 from bcut.verification.costs import Costs
 from bcut.verification.cuts import CertificateCut, check_clique, cross
 from bcut.verification.exact_points import ExactPoints, SideTable

@@ -6,7 +6,8 @@ from fractions import Fraction
 from math import ceil, floor
 
 from bcut.errors import VerificationError
-from bcut.verification.reading import FileNumber, ResultData
+from bcut.verification.entries import FileNumber
+from bcut.verification.reading import ResultData
 
 # Bounds that are no integers come from floating-point solvers, which stop at a relative gap of this size.
 RELATIVE_GAP = Fraction(1, 10**9)

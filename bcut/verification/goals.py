@@ -18,7 +18,8 @@ from fractions import Fraction
 from bcut.errors import VerificationError
 from bcut.geometry.configuration import PointConfiguration
 from bcut.objectives.syntax import read_objective
-from bcut.verification.certificate import CertificateData, CertifiedBound, check_claim
+from bcut.verification.certificate import check_claim
+from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.consistency import shown
 from bcut.verification.costs import Cost, Costs, CostTable, UnknownCostError, costs_of_objective
 from bcut.verification.exact_points import Simplex

@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from bcut.errors import VerificationError
 from bcut.geometry.numbers import AlgebraicNumber
-from bcut.verification.certificate import CertificateData, CertifiedBound, check_claim, check_cuts, check_flag
+from bcut.verification.certificate import check_claim, check_cuts, check_flag
+from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.costs import Costs, CostTable
 from bcut.verification.cuts import Candidates
 from bcut.verification.exact_points import ExactPoints, SideTable, Simplex, mask_of, without

@@ -9,7 +9,8 @@ from fractions import Fraction
 from bcut.errors import ConfigurationError, InputError, ResultError, VerificationError
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.numbers import parse_coordinate
-from bcut.verification.certificate import MAX_SUBSETS, CertificateData, CertifiedBound, certified_bound
+from bcut.verification.certificate import MAX_SUBSETS, certified_bound
+from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.consistency import (
     RELATIVE_GAP,
     check_consistency,
