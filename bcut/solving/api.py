@@ -8,7 +8,8 @@ from bcut.errors import InputError
 from bcut.result import Result
 from bcut.separation.observer import CutObserver
 from bcut.solving.groups import GroupLike
-from bcut.solving.run import InstanceLike, Run, SeparatorLike
+from bcut.solving.options import InstanceLike, Options, SeparatorLike
+from bcut.solving.run import Run
 from bcut.solving.search import Progress, place
 
 
@@ -104,24 +105,25 @@ def solve(
     >>> bcut.solve("cube:3").value
     5
     """
-    run = Run(
-        instance,
-        objective,
-        sense,
-        formulation,
-        spanning,
-        separators,
-        time_limit,
-        memory_limit,
-        seed,
-        method,
-        on_progress,
+    options = Options(
+        objective=objective,
+        sense=sense,
         then=then,
+        formulation=formulation,
+        spanning=spanning,
+        dissection=dissection,
+        require=require,
+        forbid=forbid,
+        star=star,
+        separators=separators,
+        time_limit=time_limit,
+        memory_limit=memory_limit,
+        seed=seed,
+        method=method,
         symmetries=symmetries,
         invariant_under=invariant_under,
-        dissection=dissection,
-        restrictions={"require": require, "forbid": forbid, "star": star},
     )
+    run = Run(instance, options, on_progress)
     search = run.search
     search.cut_observer = cut_observer
     run.within_limits(run.solve)
@@ -158,23 +160,24 @@ def bound(
         raise InputError(
             "method 'scip': it is for solve only; known here are auto, listing, orbits and fixing"
         )
-    run = Run(
-        instance,
-        objective,
-        sense,
-        formulation,
-        spanning,
-        separators,
-        time_limit,
-        memory_limit,
-        seed,
-        method,
-        on_progress,
-        symmetries=symmetries,
+    options = Options(
+        objective=objective,
+        sense=sense,
+        formulation=formulation,
+        spanning=spanning,
         dissection=dissection,
-        restrictions={"require": require, "forbid": forbid, "star": star},
+        require=require,
+        forbid=forbid,
+        star=star,
+        separators=separators,
+        time_limit=time_limit,
+        memory_limit=memory_limit,
+        seed=seed,
+        method=method,
+        symmetries=symmetries,
         only_bound=True,
     )
+    run = Run(instance, options, on_progress)
     run.search.status = "bound"
     run.within_limits(run.bound)
     run.search.columns = None

@@ -11,8 +11,8 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.restrictions import Restrictions
 from bcut.instance import load_instance
 from bcut.objectives.objective import sum_objective
+from bcut.solving.options import InstanceLike
 from bcut.solving.programs import formulation_name, make_formulation
-from bcut.solving.run import InstanceLike
 
 #: Suffixes of model files, each a format.
 MODEL_SUFFIXES = (".lp", ".mps")

@@ -17,7 +17,7 @@ from bcut.geometry.subsets import ranks, without
 from bcut.instance import load_instance
 
 if TYPE_CHECKING:
-    from bcut.solving.run import InstanceLike
+    from bcut.solving.options import InstanceLike
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,7 @@ from bcut.instance import load_instance
 from bcut.objectives.invariance import symmetries_of_table
 from bcut.objectives.measures import read_costs
 from bcut.objectives.objective import objective_of
-from bcut.objectives.syntax import read_level, read_objective
+from bcut.objectives.syntax import ObjectiveName, read_level, read_objective
 from bcut.result import Certificate, Question, Result
 from bcut.separation.driver import check_names
 from bcut.separation.resolve import resolve
@@ -30,10 +28,11 @@ from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_b
 from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
 from bcut.solving.compact_part import begin_fixing, make_program
 from bcut.solving.embedding import costs_to_embed
-from bcut.solving.groups import GroupLike, subgroups_to_try, symmetries_of
+from bcut.solving.groups import subgroups_to_try, symmetries_of
 from bcut.solving.levels import Levels, solve_listed
 from bcut.solving.memory import Watch, watched
 from bcut.solving.methods import Traits, check_method, choose_method
+from bcut.solving.options import InstanceLike, Options, SeparatorLike
 from bcut.solving.orbit_stage import OrbitStage, orbit_stage
 from bcut.solving.programs import formulation_name, make_formulation
 from bcut.solving.report import make_result
@@ -45,138 +44,148 @@ DEFAULT_SEPARATORS = ("link",)
 SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
 SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
 
-InstanceLike = str | os.PathLike[str] | PointConfiguration
-SeparatorLike = str | Separator | type[Separator]
-
 
 class Run:
-    """One run; the parameters are those of `bcut.solving.api.solve`."""
+    """One run.
 
-    def __init__(
-        self,
-        instance: InstanceLike,
-        objective: str,
-        sense: str | None,
-        formulation: str | None,
-        spanning: bool,
-        separators: Sequence[SeparatorLike] | None,
-        time_limit: float | None,
-        memory_limit: float | None,
-        seed: int,
-        method: str,
-        on_progress: Progress | None,
-        *,
-        then: Sequence[str] = (),
-        symmetries: GroupLike | None = None,
-        invariant_under: int | GroupLike | None = None,
-        dissection: bool = False,
-        restrictions: dict[str, Any] | None = None,
-        only_bound: bool = False,
-    ) -> None:
+    Parameters
+    ----------
+    instance : str, path or PointConfiguration
+    options : Options
+    on_progress : callable, optional
+
+    Raises
+    ------
+    BcutError
+        For everything that a user can cause by what is asked for; nothing has been computed then.
+    """
+
+    def __init__(self, instance: InstanceLike, options: Options, on_progress: Progress | None = None) -> None:
         self.started = time.perf_counter()
-        formulation = formulation_name(formulation, dissection=dissection)
-        _check_options(time_limit, memory_limit, seed)
-        self.name = read_objective(objective, sense)
-        sense = self.name.sense
-        following = [read_level(text) for text in then]
-        given = _default_separators(formulation, dissection) if separators is None else tuple(separators)
-        families_given = [_make(item) for item in given]
-        check_names(families_given)
-        deadline = None if time_limit is None else time.monotonic() + time_limit
+        self.options = options
+        options.check()
+        self.formulation = formulation_name(options.formulation, dissection=options.dissection)
+        self.name = read_objective(options.objective, options.sense)
+        following = [read_level(text) for text in options.then]
+        given = options.separators
+        if given is None:
+            given = _default_separators(self.formulation, options.dissection)
+        self.separators = tuple(given)
+        families = [_make(item) for item in self.separators]
+        check_names(families)
+        limit = options.time_limit
+        deadline = None if limit is None else time.monotonic() + limit
         self.configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
         started = time.perf_counter()
-        self.restrictions = Restrictions.of(self.configuration, **(restrictions or {}))
-        self.whole_question = formulation == "2" and not self.restrictions
-        grouped = symmetries is not None or invariant_under is not None
-        if grouped and method not in ("auto", "orbits"):
-            raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
-        self.method = "orbits" if grouped else method
-        check_method(self.method, self.name, following)
-        self.subgroups: list[PermutationGroup] | None = None
-        families = {_describe(item).split(":")[0] for item in given}
-        self.link, self.only_link = "link" in families, families <= {"link"}
-        traits = Traits(
-            self.configuration,
-            self.name,
-            spanning=spanning,
-            whole_question=self.whole_question,
-            only_link=self.only_link,
-            following=bool(following),
-            symmetries=lambda: symmetry_group(self.configuration).order,
-            only_bound=only_bound,
+        self.restrictions = Restrictions.of(
+            self.configuration, require=options.require, forbid=options.forbid, star=options.star
         )
-        self.method = choose_method(self.method, traits)
-        self.spanning, self.memory_limit = spanning, memory_limit
-        self.stage = self._orbits(objective, sense, spanning, time_limit, symmetries)
-        if self.stage is not None and invariant_under is not None:
+        self.link, self.only_link = self._link()
+        self.method = self._method(following)
+        self.stage = self._orbits()
+        self.subgroups: list[PermutationGroup] | None = None
+        if self.stage is not None and options.invariant_under is not None:
             self.subgroups = subgroups_to_try(
-                self.configuration, self.stage.group, invariant_under, seed=seed
+                self.configuration, self.stage.group, options.invariant_under, seed=options.seed
             )
-        if self.method == "fixing":
-            # The program itself is made when limits are watched.
-            whole, self.size = begin_fixing(self.configuration, self.name, spanning=spanning), (0, 0)
-        elif self.method == "elimination":
-            whole, self.size = empty_part(self.configuration), (0, 0)
-        elif self.stage is None:
-            listed = make_formulation(
-                formulation,
-                self.configuration,
-                spanning=spanning,
-                dissection=dissection,
-                restrictions=self.restrictions,
-            )
-            if listed.dissection and not listed.chirotope.is_general:
-                _check_valid_for_dissections(families_given)
-            whole = Part.whole(listed, objective_of(self.name, listed))
-            self.size = listed.size
-        else:
-            whole = known_triangulation(self.stage)
-            self.size = (int(self.stage.formulation.sizes.sum()), self.stage.formulation.matrix.shape[0] + 1)
+        whole, self.size = self._whole(families)
         self.search = Search(
             whole=whole,
-            make_separators=lambda: [_make(item) for item in given],
+            make_separators=lambda: [_make(item) for item in self.separators],
             deadline=deadline,
-            seed=seed,
+            seed=options.seed,
             on_progress=on_progress,
             restricted=bool(self.restrictions),
         )
         self.levels = Levels(self.search, following) if following else None
         self.search.seconds["model"] = time.perf_counter() - started
-        self.question = Question(
-            objective=objective,
-            sense=sense,
-            spanning=spanning,
-            formulation=formulation,
-            separators=[_describe(item) for item in given],
-            seed=seed,
-            limits={"time": time_limit, "memory": memory_limit},
-            method=self.method,
-            invariant_under=None
-            if self.subgroups is None
-            else [subgroup.generators.tolist() for subgroup in self.subgroups],
-            dissection=dissection,
-            require=[list(face) for face in self.restrictions.require],
-            forbid=[list(face) for face in self.restrictions.forbid],
-            star=self.restrictions.star,
-        )
+        self.question = self._question()
 
-    def _orbits(
-        self,
-        objective: str,
-        sense: str,
-        spanning: bool,
-        seconds: float | None,
-        symmetries: GroupLike | None,
-    ) -> OrbitStage | None:
+    def _link(self) -> tuple[bool, bool]:
+        """Tell whether link cuts are at work, and whether no other family is."""
+        families = {_describe(item).split(":")[0] for item in self.separators}
+        return "link" in families, families <= {"link"}
+
+    def _method(self, following: Sequence[ObjectiveName]) -> str:
+        """Return the method, chosen or checked."""
+        options, method = self.options, self.options.method
+        if options.symmetries is not None or options.invariant_under is not None:
+            if method not in ("auto", "orbits"):
+                raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
+            method = "orbits"
+        check_method(method, self.name, following)
+        traits = Traits(
+            self.configuration,
+            self.name,
+            spanning=options.spanning,
+            whole_question=self.formulation == "2" and not self.restrictions,
+            only_link=self.only_link,
+            following=bool(following),
+            symmetries=lambda: symmetry_group(self.configuration).order,
+            only_bound=options.only_bound,
+        )
+        return choose_method(method, traits)
+
+    def _orbits(self) -> OrbitStage | None:
         """Return the stage over orbits where that is the method."""
         if self.method != "orbits":
             return None
-        group = symmetries_of(self.configuration, symmetries)
-        if objective != "cardinality":
-            default, table = read_costs(Path(objective.partition(":")[2]), self.configuration)
+        options = self.options
+        group = symmetries_of(self.configuration, options.symmetries)
+        if options.objective != "cardinality":
+            default, table = read_costs(Path(options.objective.partition(":")[2]), self.configuration)
             group = symmetries_of_table(group, default, table)
         return orbit_stage(
-            self.configuration, objective, sense=sense, spanning=spanning, group=group, seconds=seconds
+            self.configuration,
+            options.objective,
+            sense=self.name.sense,
+            spanning=options.spanning,
+            group=group,
+            seconds=options.time_limit,
+        )
+
+    def _whole(self, families: Sequence[Separator]) -> tuple[Part, tuple[int, int]]:
+        """Return the whole program as far as it is made before limits are watched, and its size."""
+        options = self.options
+        if self.method == "fixing":
+            return begin_fixing(self.configuration, self.name, spanning=options.spanning), (0, 0)
+        if self.method == "elimination":
+            return empty_part(self.configuration), (0, 0)
+        if self.stage is not None:
+            formulation = self.stage.formulation
+            size = (int(formulation.sizes.sum()), formulation.matrix.shape[0] + 1)
+            return known_triangulation(self.stage), size
+        listed = make_formulation(
+            self.formulation,
+            self.configuration,
+            spanning=options.spanning,
+            dissection=options.dissection,
+            restrictions=self.restrictions,
+        )
+        if listed.dissection and not listed.chirotope.is_general:
+            _check_valid_for_dissections(families)
+        return Part.whole(listed, objective_of(self.name, listed)), listed.size
+
+    def _question(self) -> Question:
+        """Return what was asked, as it stands in the result file."""
+        options = self.options
+        invariant_under = None
+        if self.subgroups is not None:
+            invariant_under = [subgroup.generators.tolist() for subgroup in self.subgroups]
+        return Question(
+            objective=options.objective,
+            sense=self.name.sense,
+            spanning=options.spanning,
+            formulation=self.formulation,
+            separators=[_describe(item) for item in self.separators],
+            seed=options.seed,
+            limits={"time": options.time_limit, "memory": options.memory_limit},
+            method=self.method,
+            invariant_under=invariant_under,
+            dissection=options.dissection,
+            require=[list(face) for face in self.restrictions.require],
+            forbid=[list(face) for face in self.restrictions.forbid],
+            star=self.restrictions.star,
         )
 
     def within_limits(self, work: Callable[[], None]) -> None:
@@ -184,7 +193,7 @@ class Run:
         search = self.search
         watch = Watch()
         try:
-            with watched(watch, memory=self.memory_limit, deadline=search.deadline):
+            with watched(watch, memory=self.options.memory_limit, deadline=search.deadline):
                 work()
         except KeyboardInterrupt:
             search.status = "interrupted"
@@ -276,15 +285,6 @@ class Run:
                 "2", self.configuration, spanning=program.spanning, restrictions=self.restrictions
             )
         return make_infeasibility_certificate(program)
-
-
-def _check_options(time_limit: float | None, memory_limit: float | None, seed: int) -> None:
-    if time_limit is not None and not 0 <= time_limit < inf:
-        raise InputError(f"time limit {time_limit}: give a finite number of seconds that is not negative")
-    if memory_limit is not None and not 0 < memory_limit < inf:
-        raise InputError(f"memory limit {memory_limit}: give a finite positive number of GiB")
-    if seed < 0:
-        raise InputError(f"seed {seed}: give an integer that is not negative")
 
 
 def _default_separators(formulation: str, dissection: bool) -> tuple[str, ...]:
