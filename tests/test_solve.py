@@ -239,7 +239,9 @@ def test_targets_grow_until_one_is_reached(monkeypatch: pytest.MonkeyPatch, tmp_
     assert best == optimum * 50_000
     assert_solved(result, best)
     assert 1 < len(targets) < 15
-    assert targets == sorted(targets)
+    # A triangulation within a target may be found that is not the best: then the next one lies just below it.
+    out_of_reach = [target for target in targets if target < best]
+    assert out_of_reach == sorted(set(out_of_reach))
 
 
 # TOPCOM.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
@@ -130,8 +130,10 @@ class _Loop:
         separation: Separation | None,
         limits: RootLimits,
         on_round: Callable[[Round], None] | None,
+        cuts: Sequence[IntegerCut],
     ) -> None:
         self.relaxation = Relaxation(formulation, objective, deadline=limits.deadline)
+        self.relaxation.add(cuts)
         self.limits, self.on_round = limits, on_round
         self.result = RootBound(np.arange(len(formulation.simplices)), separation)
         self.slack_for: dict[tuple[bytes, bytes, int], int] = {}
@@ -280,6 +282,7 @@ def root_bound(
     *,
     limits: RootLimits | None = None,
     on_round: Callable[[Round], None] | None = None,
+    cuts: Sequence[IntegerCut] = (),
 ) -> RootBound:
     """Bound the optimum by the linear relaxation and cuts.
 
@@ -292,9 +295,11 @@ def root_bound(
     limits : RootLimits, optional
     on_round : callable, optional
         Told of every finished round.
+    cuts : sequence of IntegerCut
+        Known already: they are in the relaxation from the start.
 
     Returns
     -------
     RootBound
     """
-    return _Loop(formulation, objective, separation, limits or RootLimits(), on_round).run()
+    return _Loop(formulation, objective, separation, limits or RootLimits(), on_round, cuts).run()

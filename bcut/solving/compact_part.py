@@ -24,6 +24,7 @@ from bcut.solving.search import Part, Search
 
 # Seconds of local search, at most, and its share of what is left.
 _SECONDS_OF_FLIPS, _SHARE_OF_FLIPS = 20.0, 0.2
+_COLUMNS_PER_SECOND = 5000
 # Descents with disturbed costs: 400 take one to three seconds for 30 to 40 points in space. They lead from 20 %
 # above the optimal weight or 50 % above the least cardinality to 2 % above.
 _STEPS, _SLOWER = 400, 4
@@ -177,7 +178,9 @@ def anneal_incumbent(search: Search, reduced_costs: NDArray[np.floating[Any]]) -
 
     guide = np.sqrt(np.maximum(reduced_costs, 0.0) * scale)
     left = inf if search.seconds_left is None else search.seconds_left
-    deadline = time.monotonic() + min(_SECONDS_OF_FLIPS, _SHARE_OF_FLIPS * left)
+    # In proportion to what the relaxations of so many columns are going to take.
+    seconds = min(_SECONDS_OF_FLIPS, len(costs) / _COLUMNS_PER_SECOND)
+    deadline = time.monotonic() + min(seconds, _SHARE_OF_FLIPS * left)
     enough = -inf if search.bound is None else float(search.bound)
     steps = _STEPS
     with search.timed("incumbent"):

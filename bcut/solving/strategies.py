@@ -6,10 +6,13 @@ from fractions import Fraction
 from typing import Literal
 
 from bcut.bounds.root import RootBound, Stage
+from bcut.solving.sampling import sample_vertices
 from bcut.solving.search import Part, Search, bound_at_root, branch, place
 
 # A value within this relative distance of the bound counts as optimal where values are not integral.
 RELATIVE_GAP = 1e-9
+# So many targets go up by one step each, before steps grow: on targets that are met exactly, little is left to search.
+_STEADY = 3
 
 
 def solve_by_targets(search: Search) -> None:
@@ -38,7 +41,7 @@ def reach_targets(search: Search) -> None:
     refuted = 0
     while not is_optimal(search):
         assert search.bound is not None
-        step = max(1, abs(search.bound) // (1000 * unit)) << max(0, refuted - 1)
+        step = max(1, abs(search.bound) // (1000 * unit)) << max(0, refuted - _STEADY)
         target = search.bound + (step - 1) * unit
         if search.value is not None:
             target = min(target, search.sign * search.value - unit)
@@ -55,7 +58,7 @@ def reach_targets(search: Search) -> None:
         elif outcome == "reached":
             assert search.value is not None
             search.raise_bound(search.sign * search.value)
-        else:
+        elif outcome != "improved":
             search.status = outcome
             return
     search.status = "optimal"
@@ -69,10 +72,11 @@ def is_optimal(search: Search) -> bool:
 
 def _reach(
     search: Search, part: Part, target: Fraction
-) -> tuple[Literal["reached", "refuted", "limit", "interrupted"], list[Stage]]:
+) -> tuple[Literal["reached", "improved", "refuted", "limit", "interrupted"], list[Stage]]:
     """Find a best triangulation on a part that contains all those with at most the target value (times sign).
 
-    Where the relaxations alone refute the target, the stages are the proof.
+    Where the relaxations alone refute the target, the stages are the proof. "improved" says that a better triangulation
+    within the target was found, but perhaps no best one.
     """
     root = bound_at_root(search, part, search.separation(part), target=target)
     search.columns_after_fixing = len(root.columns)
@@ -88,6 +92,12 @@ def _reach(
             return "refuted", root.stages
     if search.seconds_left == 0.0:
         return "limit", []
+    before = search.value
+    sample_vertices(search, part, root, target)
+    if is_optimal(search):
+        return "reached", []
+    if search.value != before:
+        return "improved", []
     # SCIP keeps solutions strictly better than the cutoff; no other value lies within half a unit of the target.
     status = branch(search, part, root, cutoff=float(search.sign * (target + objective.unit / 2)))
     if status == "infeasible":
