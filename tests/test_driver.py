@@ -255,3 +255,29 @@ def test_an_error_shows_where_it_was_raised_when_printed() -> None:
 def test_two_separators_of_one_name_are_refused() -> None:
     with pytest.raises(SeparatorLoadError, match="'watching' is given twice"):
         at_work(FORMULATION, Watching(), Watching())
+
+
+def test_later_stages_are_asked_only_where_earlier_ones_have_nothing_to_add() -> None:
+    class Late(Scripted):
+        stage = 1
+
+    first = Scripted(lambda point: [Cut([0], 0)] if point.x[0] > 0.4 else [], "first")
+    late = Late(lambda point: [Cut([1], 0)], "late")
+    separation = at_work(FORMULATION, late, first)
+    assert [cut.family for cut in separation.round(HALVES)] == ["first"]
+    assert separation.statistics["late"].calls == 0
+    without_first = HALVES.copy()
+    without_first[0] = 0.0
+    assert [cut.family for cut in separation.round(without_first)] == ["late"]
+    assert (separation.statistics["first"].calls, separation.statistics["late"].calls) == (2, 1)
+
+
+def test_a_cut_that_is_known_already_does_not_keep_later_stages_out() -> None:
+    class Late(Scripted):
+        stage = 1
+
+    first = Scripted(lambda point: [Cut([0], 0)], "first")
+    separation = at_work(FORMULATION, first, Late(lambda point: [Cut([1], 0)], "late"))
+    for cut in separation.round(HALVES):
+        separation.confirm(cut)
+    assert [cut.family for cut in separation.round(HALVES)] == ["late"]

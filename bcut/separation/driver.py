@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import floor, gcd, lcm
@@ -198,7 +198,9 @@ class Separation:
             self.observer.relaxed(value, node)
 
     def round(self, x: NDArray[np.floating]) -> list[IntegerCut]:
-        """Ask every separator about a point and return the cuts worth adding.
+        """Ask the separators about a point, stage by stage, and return the cuts worth adding.
+
+        Those of a later stage are asked only where the earlier ones left nothing to add.
 
         Parameters
         ----------
@@ -219,23 +221,32 @@ class Separation:
         if point.is_integral:
             return []
         candidates: list[IntegerCut] = []
-        for separator in self.separators:
-            statistics = self.statistics[separator.name]
-            statistics.calls += 1
-            with _guard(separator, "separate", statistics):
-                for cut in separator.separate(point):
-                    try:
-                        scaled = to_integers(_checked(cut, separator.name), separator.name, len(x))
-                    except UnusableCutError:
-                        statistics.found += 1
-                        continue
-                    if scaled.efficacy(x) > self.limits.min_efficacy:
-                        statistics.found += 1
-                        candidates.append(scaled)
-        chosen = self._select(candidates, x)
+        chosen: list[IntegerCut] = []
+        for stage in sorted({separator.stage for separator in self.separators}):
+            for separator in self.separators:
+                if separator.stage == stage:
+                    candidates.extend(self._ask(separator, point))
+            chosen = self._select(candidates, x)
+            if chosen:
+                break
         if self.observer is not None:
             self.observer.separated(self.problem, x, candidates, chosen)
         return chosen
+
+    def _ask(self, separator: Separator, point: FractionalPoint) -> Iterator[IntegerCut]:
+        """Yield the cuts of one separator that are violated enough."""
+        statistics = self.statistics[separator.name]
+        statistics.calls += 1
+        with _guard(separator, "separate", statistics):
+            for cut in separator.separate(point):
+                try:
+                    scaled = to_integers(_checked(cut, separator.name), separator.name, len(point.x))
+                except UnusableCutError:
+                    statistics.found += 1
+                    continue
+                if scaled.efficacy(point.x) > self.limits.min_efficacy:
+                    statistics.found += 1
+                    yield scaled
 
     def confirm(self, cut: IntegerCut) -> None:
         """Record that the solver took a cut: it counts as added and is not offered again."""

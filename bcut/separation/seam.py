@@ -245,6 +245,8 @@ class Separator(ABC):
     name: ClassVar[str] = ""
     #: Whether the cuts are valid for all dissections too, not only for triangulations.
     dissections: ClassVar[bool] = False
+    #: When the family is asked: those of later stages, the costly ones, only where earlier ones leave nothing to add.
+    stage: ClassVar[int] = 0
     problem: Problem
 
     def setup(self, problem: Problem) -> None:
