@@ -52,7 +52,9 @@ def broken(report: CheckReport) -> set[str]:
     return {failure.rule for failure in report.failures}
 
 
-@pytest.mark.parametrize("name", ["clique", "odd-cycle", "convex-polygon", "parity"])
+@pytest.mark.parametrize(
+    "name", ["clique", "odd-cycle", "convex-polygon", "parity", "face-crossing", "sphere"]
+)
 def test_the_built_in_families_pass(name: str) -> None:
     report = check_separator(lambda: resolve(name), FEW)
     assert report.ok, report.summary

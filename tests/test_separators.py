@@ -19,19 +19,20 @@ from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.objectives.objective import Objective, make_objective
+from bcut.separation.cliques import heavy_cliques
 from bcut.separation.driver import Separation, to_integers
-from bcut.separation.resolve import resolve
-from bcut.separation.seam import FractionalPoint, Problem, Separator
-from bcut.separators.clique import Clique, heavy_cliques
-from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
-from bcut.separators.odd_cycle import (
-    OddCycle,
+from bcut.separation.odd_cycles import (
     chordless_cycle,
     heaviest_stable,
     hole_gains,
     odd_closed_walks,
     sequential_lifting,
 )
+from bcut.separation.resolve import resolve
+from bcut.separation.seam import FractionalPoint, Problem, Separator
+from bcut.separators.clique import Clique
+from bcut.separators.convex_polygon import ConvexPolygon, Lines, violated_polygons
+from bcut.separators.odd_cycle import OddCycle
 
 
 def problem(instance: str, *, spanning: bool = False) -> Problem:

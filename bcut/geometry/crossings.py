@@ -58,8 +58,11 @@ class FaceTable:
     def boundary(self, face_size: int) -> NDArray[np.int64]:
         """Return, for each face and position, the row of ``faces[face_size - 1]`` that omits that vertex."""
         faces = self.faces[face_size]
-        omitted = np.stack([ranks(without(faces, i), self.n) for i in range(face_size)], axis=1)
-        return np.searchsorted(self._ranks[face_size - 1], omitted)
+        return np.stack([self.rows(without(faces, i)) for i in range(face_size)], axis=1)
+
+    def rows(self, faces: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Return the rows in which some ascending faces of one size are listed, shape (..., s) to (...)."""
+        return np.searchsorted(self._ranks[faces.shape[-1]], ranks(faces, self.n))
 
 
 class CrossingTable:
@@ -102,6 +105,15 @@ class CrossingTable:
                     crossing |= hit[column]
             omitting = keeping
         return np.ascontiguousarray(np.unpackbits(crossing, axis=1, count=left.count).T).view(np.bool_)
+
+    def between_faces(self, size: int) -> NDArray[np.bool_]:
+        """Tell which faces with `size` vertices of the fixed simplices cross which with d + 2 - size vertices.
+
+        Only pairs whose vertices are different and span the space are told of, shape (f_s, f_(d+2-s)): circuits of
+        fewer points are not looked for.
+        """
+        omitting, keeping = (self._orientations(self.table, s) for s in (size - 1, size))
+        return self._crossing_faces(self.table, size, omitting, keeping)
 
     def _crossing_faces(
         self, left: FaceTable, size: int, omitting: NDArray[np.int8], keeping: NDArray[np.int8]

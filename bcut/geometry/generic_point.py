@@ -41,6 +41,31 @@ def simplices_containing_generic_point(
     return contained
 
 
+def contain_generic_points(
+    chirotope: Chirotope, simplices: NDArray[np.integer], flags: NDArray[np.integer]
+) -> NDArray[np.bool_]:
+    """Tell which simplices contain the generic point of the flag in the same row.
+
+    Parameters
+    ----------
+    chirotope : Chirotope
+    simplices : ndarray of int, shape (k, d + 1)
+        Ascending vertices.
+    flags : ndarray of int, shape (k, d + 1)
+        Ordered, affinely independent tuples.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+    """
+    contained = np.ones(len(simplices), dtype=bool)
+    for position in range(simplices.shape[1]):
+        facets = ranks(without(simplices, position), chirotope.n)
+        point_sides = _first_nonzero(chirotope.sides[facets[:, None], flags])
+        contained &= point_sides == chirotope.sides[facets, simplices[:, position]]
+    return contained
+
+
 def _first_nonzero(table: NDArray[np.int8]) -> NDArray[np.int8]:
     """Return the first nonzero entry of each row, 0 where there is none."""
     result = np.zeros(len(table), dtype=np.int8)

@@ -109,14 +109,14 @@ def _check_lifting(
         if weights[position] <= 0:
             continue
         compatible = ((1 << position) - 1) & ~crossed[position]
-        if _exceeds(compatible, crossed, weights, rhs - weights[position]):
+        if exceeds(compatible, crossed, weights, rhs - weights[position]):
             raise VerificationError(
                 f"odd-cycle cut: the coefficient {weights[position]} of {list(order[position])} is larger than "
                 "what lifting it gives"
             )
 
 
-def _exceeds(nodes: int, crossed: Sequence[int], weights: Sequence[Fraction], limit: Fraction) -> bool:
+def exceeds(nodes: int, crossed: Sequence[int], weights: Sequence[Fraction], limit: Fraction) -> bool:
     """Tell whether some of the nodes that do not cross each other weigh more than a limit."""
     if limit < 0:
         return True
@@ -124,7 +124,7 @@ def _exceeds(nodes: int, crossed: Sequence[int], weights: Sequence[Fraction], li
         lowest = nodes & -nodes
         nodes ^= lowest
         node = lowest.bit_length() - 1
-        if weights[node] > 0 and _exceeds(nodes & ~crossed[node], crossed, weights, limit - weights[node]):
+        if weights[node] > 0 and exceeds(nodes & ~crossed[node], crossed, weights, limit - weights[node]):
             return True
     return False
 

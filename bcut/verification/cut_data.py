@@ -102,6 +102,14 @@ class Candidates(SideTable):
             found = self._crossing[pair] = cross(self, *pair)
         return found
 
+    def faces_crossing(self, first: Simplex, second: Simplex, rest: Simplex) -> bool:
+        """Tell whether two faces of any dimension cross; `rest` extends the first one to an affine basis."""
+        pair = (first, second) if first < second else (second, first)
+        found = self._crossing.get(pair)
+        if found is None:
+            found = self._crossing[pair] = faces_cross(self, first, second, rest)
+        return found
+
     def circuit(self, points: Simplex) -> tuple[int, int]:
         """Return the two parts of the affine dependence of d + 2 ascending points, as bit sets; remembers them."""
         found = self._circuits.get(points)
@@ -134,6 +142,51 @@ def cross(sides: SideTable, first: Simplex, second: Simplex) -> bool:
         if not (minus & outside_first or plus & outside_second):
             return True
     return False
+
+
+def faces_cross(sides: Candidates, first: Simplex, second: Simplex, rest: Simplex) -> bool:
+    """Tell whether two simplices of any dimension do not meet in a common (possibly empty) face.
+
+    They do not if and only if some circuit (Z+, Z-) among their vertices has Z+ in the one and Z- in the other. Further
+    points that are independent of the vertices bring no more circuits in. With as many of them as the space needs, each
+    circuit is the one dependence of d + 2 points that span the space.
+
+    Parameters
+    ----------
+    sides : Candidates
+    first, second : tuple of int
+        Vertices of simplices, ascending.
+    rest : tuple of int
+        Points that extend the first one to an affine basis of the space.
+    """
+    size = sides.points.dimension + 1 - len(first)
+    fresh = [vertex for vertex in second if vertex not in first]
+    # As many points of the second as possible, and the other ones from the rest, make the first a basis.
+    further = next(
+        extension
+        for count in range(min(size, len(fresh)), -1, -1)
+        for part in combinations(fresh, count)
+        for extension in combinations(rest, size - count)
+        if not set(part) & set(extension) and sides.orientation(tuple(sorted((*first, *part, *extension))))
+    )
+    outside_first, outside_second = ~mask_of(first), ~mask_of(second)
+    for points in combinations(sorted({*first, *fresh, *further}), sides.points.dimension + 2):
+        plus, minus = sides.circuit(points)
+        for one, other in ((plus, minus), (minus, plus)):
+            if one | other and not (one & outside_first or other & outside_second):
+                return True
+    return False
+
+
+def covers(sides: SideTable, simplex: Simplex, flag: Simplex) -> bool:
+    """Tell whether a simplex contains the generic point of a flag, on each hyperplane the side of its first vertex."""
+    for position, vertex in enumerate(simplex):
+        plus, minus = sides[without(simplex, position)]
+        own = plus if plus >> vertex & 1 else minus
+        first = next(v for v in flag if (plus | minus) >> v & 1)
+        if not own >> first & 1:
+            return False
+    return True
 
 
 def _circuit(sides: SideTable, points: Simplex) -> tuple[int, int]:

@@ -14,9 +14,11 @@ from fractions import Fraction
 from bcut.verification.crossing_cuts import check_clique, check_odd_cycle
 from bcut.verification.cut_data import Candidates, CertificateCut, cross
 from bcut.verification.exact_points import SideTable
+from bcut.verification.face_cuts import check_face_crossing
 from bcut.verification.link_cuts import check_link
 from bcut.verification.parity_cuts import check_parity
 from bcut.verification.polygon_cuts import check_convex_polygon
+from bcut.verification.sphere_cuts import check_sphere
 
 Checker = Callable[[SideTable, CertificateCut], Fraction]
 
@@ -26,6 +28,8 @@ CUT_CHECKERS: dict[str, Checker] = {
     "link": check_link,
     "convex-polygon": check_convex_polygon,
     "parity": check_parity,
+    "face-crossing": check_face_crossing,
+    "sphere": check_sphere,
 }
 
 __all__ = ["CUT_CHECKERS", "Candidates", "CertificateCut", "Checker", "check_clique", "cross", "cut_checker"]

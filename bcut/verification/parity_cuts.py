@@ -7,8 +7,8 @@ from itertools import combinations, pairwise
 from typing import Any
 
 from bcut.errors import VerificationError
-from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of
-from bcut.verification.exact_points import SideTable, Simplex, without
+from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of, covers
+from bcut.verification.exact_points import SideTable, Simplex
 
 
 def check_parity(sides: SideTable, cut: CertificateCut) -> Fraction:
@@ -70,20 +70,9 @@ def _odd_candidates(candidates: Candidates, cut: CertificateCut) -> tuple[set[Si
     covering = {
         simplex
         for simplex in combinations(range(n), d + 1)
-        if simplex in candidates and _covers(candidates, simplex, order)
+        if simplex in candidates and covers(candidates, simplex, order)
     }
     return odd ^ covering, 1
-
-
-def _covers(candidates: Candidates, simplex: Simplex, flag: Simplex) -> bool:
-    """Tell whether a simplex contains the generic point of a flag, on each hyperplane the side of its first vertex."""
-    for position, vertex in enumerate(simplex):
-        plus, minus = candidates[without(simplex, position)]
-        own = plus if plus >> vertex & 1 else minus
-        first = next(v for v in flag if (plus | minus) >> v & 1)
-        if not own >> first & 1:
-            return False
-    return True
 
 
 def _sets(value: Any, n: int, size: int, what: str) -> list[Simplex]:
