@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.separation.cliques import heavy_cliques
+from bcut.separation.graphs.cliques import heavy_cliques
 from bcut.separation.seam import Cut, FractionalPoint, Separator
 
 # Candidates for lifting that are tried, per simplex that is added.

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 
 from bcut.geometry.face_crossings import FaceGraph
 from bcut.geometry.face_values import FaceValues
-from bcut.separation.cliques import heavy_cliques
-from bcut.separation.odd_cycles import (
+from bcut.separation.graphs.cliques import heavy_cliques
+from bcut.separation.graphs.odd_cycles import (
     chordless_cycle,
     hole_gains,
     lifted_violation,
@@ -41,8 +41,8 @@ from bcut.separation.odd_cycles import (
     sequential_lifting,
     turned_cycle,
 )
+from bcut.separation.graphs.stable_triples import sets_without_stable_triples
 from bcut.separation.seam import TOLERANCE, Cut, FractionalPoint, Problem, Separator
-from bcut.separation.stable_triples import sets_without_stable_triples
 
 # Cuts count as violated from this much on.
 _MARGIN = 1e-4

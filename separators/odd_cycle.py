@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.separation.odd_cycles import (
+from bcut.separation.graphs.odd_cycles import (
     BACKENDS,
     chordless_cycle,
     hole_gains,

@@ -29,9 +29,9 @@ from bcut.geometry.generic_point import simplices_containing_generic_point
 from bcut.geometry.triangulations import triangulations
 from bcut.objectives.objective import Objective
 from bcut.separation.driver import to_integers
+from bcut.separation.graphs.stable_triples import sets_without_stable_triples
 from bcut.separation.resolve import resolve
 from bcut.separation.seam import Cut, FractionalPoint, Problem
-from bcut.separation.stable_triples import sets_without_stable_triples
 from bcut.separators.face_crossing import FaceCrossing
 from bcut.verification.cut_data import Candidates, CertificateCut
 from bcut.verification.exact_points import ExactPoints

@@ -11,8 +11,14 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 SEPARATORS = sorted((ROOT / "separators").glob("*.py"))
 
-# What a separator may import of this package: the seam, the geometry, and small linear programs for exact separation.
-ALLOWED = ("bcut.separation.seam", "bcut.separation.small_lp", "bcut.geometry", "bcut.separators")
+# What a separator may import: the seam, the geometry, algorithms on graphs, and small linear programs.
+ALLOWED = (
+    "bcut.separation.seam",
+    "bcut.separation.graphs",
+    "bcut.separation.small_lp",
+    "bcut.geometry",
+    "bcut.separators",
+)
 # A solver is none of its business.
 FORBIDDEN = {"pyscipopt", "highspy"}
 

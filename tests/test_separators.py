@@ -19,9 +19,9 @@ from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.objectives.objective import Objective, make_objective
-from bcut.separation.cliques import heavy_cliques
 from bcut.separation.driver import Separation, to_integers
-from bcut.separation.odd_cycles import (
+from bcut.separation.graphs.cliques import heavy_cliques
+from bcut.separation.graphs.odd_cycles import (
     chordless_cycle,
     heaviest_stable,
     hole_gains,
