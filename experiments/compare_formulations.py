@@ -1,15 +1,14 @@
-"""Compare all formulations: their optima, their relaxations, their sizes (docs/formulations.md).
+"""Compare all formulations: their optima and their relaxations (docs/formulations.md).
 
 Thirty random configurations and small degenerate ones, in cardinality and weight. Everything is compared with brute
-force over all triangulations, and every result is verified exactly. A second table measures how the sizes grow.
+force over all triangulations, and every result is verified exactly.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
-from math import comb, inf, isclose, log
+from math import inf, isclose
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,7 @@ from runs import run_all
 
 import bcut
 import bcut.instances
-from bcut.formulations.chambers import chamber_formulation
 from bcut.formulations.cocircuits import cocircuit_formulation
-from bcut.formulations.face_sets import face_set_formulation
-from bcut.formulations.stable_sets import stable_set_formulation
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.objectives.objective import make_objective
@@ -35,13 +31,6 @@ RANDOM = [
     *((f"random:{n},4,seed={seed}", False) for n in (7, 8) for seed in range(1, 6)),
 ]
 LIMITS = {2: 12, 3: 9, 4: 8}
-BUILDERS = {
-    "0": lambda points: stable_set_formulation(points, lazy=False),
-    "1": lambda points: face_set_formulation(points, lazy=False),
-    "2": cocircuit_formulation,
-    "chambers": chamber_formulation,
-}
-GROWTH = {2: (6, 8, 10, 12, 14), 3: (6, 7, 8, 9, 10), 4: (7, 8, 9)}
 
 
 def instances() -> list[tuple[str, bool]]:
@@ -100,18 +89,6 @@ def measure(instance: str, spanning: bool, limit: float) -> dict[str, Any]:
     return {"triangulations": count, "runs": runs}
 
 
-def sizes(dimension: int, n: int) -> dict[str, Any]:
-    """Count columns, rows and entries of every formulation of random points."""
-    points = load_instance(f"random:{n},{dimension},seed=1")
-    found: dict[str, Any] = {}
-    for name, build in BUILDERS.items():
-        formulation = build(points)
-        columns, rows = formulation.size
-        found[name] = {"columns": columns, "rows": rows, "per_row": formulation.matrix.nnz / rows}
-    found["simplices"] = comb(n, dimension + 1)
-    return found
-
-
 def agreement(records: list[dict[str, Any]]) -> str:
     """Return the table of optima and relaxations for the minimum cardinality, and what holds of all objectives."""
     lines = [
@@ -154,44 +131,8 @@ def agreement(records: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def growth(records: list[dict[str, Any]]) -> str:
-    """Return the table of sizes, with measured exponents beside those of the paper's Table 1."""
-    lines = [
-        "| d | formulation | "
-        + "columns and rows as n grows | growth of columns | of rows | orders in the paper |",
-        "|---:|---|---|---:|---:|---|",
-    ]
-    for dimension, counts in GROWTH.items():
-        own = {record["key"][1]: record for record in records if record["key"][0] == dimension}
-        first, last = counts[-2], counts[-1]
-        orders = {
-            "0": f"n^{dimension + 1}, n^{2 * dimension + 2}",
-            "1": f"n^{dimension + 1}, n^{dimension + 2}",
-            "2": f"n^{dimension + 1}, n^{dimension}",
-            "chambers": f"n^{dimension + 1}, –",
-        }
-        for name in FORMULATIONS:
-            pairs = [f"{own[n][name]['columns']:,} × {own[n][name]['rows']:,}" for n in counts]
-            exponents = [
-                log(own[last][name][what] / own[first][name][what]) / log(last / first)
-                for what in ("columns", "rows")
-            ]
-            lines.append(
-                f"| {dimension} | {name} | n = {', '.join(map(str, counts))}: {'; '.join(pairs)} "
-                f"| n^{exponents[0]:.1f} | n^{exponents[1]:.1f} | {orders[name]} |"
-            )
-    return "\n".join(lines)
-
-
-def keys_of_growth() -> Iterator[tuple[int, int]]:
-    """Yield dimensions and numbers of points."""
-    for dimension, counts in GROWTH.items():
-        for n in counts:
-            yield dimension, n
-
-
 def main() -> None:
-    """Run the experiment and print its tables."""
+    """Run the experiment and print its table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True, help="folder for the results")
     parser.add_argument(
@@ -199,15 +140,12 @@ def main() -> None:
     )
     options = parser.parse_args()
     np.seterr(all="raise", under="ignore")
-    sized = run_all(keys_of_growth(), sizes, options.output / "sizes.jsonl")
     records = run_all(
         instances(),
         lambda instance, spanning: measure(instance, spanning, options.limit),
         options.output / "runs.jsonl",
     )
     print(agreement(records))
-    print()
-    print(growth(sized))
 
 
 if __name__ == "__main__":

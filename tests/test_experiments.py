@@ -223,7 +223,7 @@ GOOD = GOOD_INSTANCES + GOOD_VARIANTS
         (GOOD_INSTANCES, r"'variants' is missing"),
         (GOOD + "seperators = []\n", r"plan\.toml, line 5: .*variants.* number 1, 'seperators'.* mean 'separators'"),
         ("objektive = 1\n" + GOOD, r"line 1: 'objektive' is no known key; did you mean 'objective'"),
-        (GOOD + 'preset = "rot"\n', r"line 5: .*'preset' is one of loop, root, solve, plain, not 'rot'"),
+        (GOOD + 'preset = "rot"\n', r"line 5: .*'preset' is one of loop, root, solve, plain, .*, not 'rot'"),
         (GOOD + 'separators = ["linc"]\n', r"line 5: .*unknown separator 'linc': did you mean 'link'"),
         (GOOD + 'separators = ["clique:size=3"]\n', r"line 5: .*no parameter 'size'"),
         (GOOD + 'separators = ["./none.py"]\n', r"none\.py: there is no such file"),

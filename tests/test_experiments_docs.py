@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bcut.cli.main import run
-from bcut.experiments import cases, plan, variants
+from bcut.experiments import cases, drawings, plan, variants
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
@@ -44,6 +44,7 @@ def test_the_first_experiment_runs(
         ("at the top", set(plan._TOP)),
         (r"in `\[\[instances\]\]`", set(cases._KEYS)),
         (r"in `\[\[variants\]\]`", set(variants._KEYS)),
+        (r"in `\[\[figures\]\]`", set(drawings._KEYS)),
     ],
 )
 def test_every_key_of_a_plan_is_explained(section: str, keys: set[str]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,19 @@ from typing import Any
 from bcut.errors import BcutError, InputError
 from bcut.experiments.ranges import combinations_of, placeholders, values_of
 from bcut.experiments.reading import Table, read_json
-from bcut.objectives.syntax import BOTTLENECKS, MeasureName, read_objective
+from bcut.objectives.measures import refuse_unknown
+from bcut.objectives.syntax import BOTTLENECKS, MeasureName, ObjectiveName, read_objective
 
 _KEYS = (
     "instance", "file", "collection", "classes", "for", "class", "objective", "sense", "spanning", "formulation",
-    "optimum",
+    "optimum", "orders",
 )  # fmt: skip
 _MEMBER_KEYS = (
     "instance", "class", "objective", "sense", "spanning", "formulation", "optimum", "lp", "columns", "found_by",
     "note", "bound",
 )  # fmt: skip
+#: What sizes are measured in; "per_row" are the nonzeros of a row, on average.
+MEASURES = ("columns", "rows", "nonzeros", "per_row")
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Case:
     formulation : str
     optimum : Fraction or None
         Where it is known.
+    orders : dict of str to float
+        Exponents of the number of points that a theory gives for measures of size, to be compared with measured ones.
     """
 
     instance: str
@@ -50,6 +55,7 @@ class Case:
     spanning: bool = False
     formulation: str = "2"
     optimum: Fraction | None = None
+    orders: dict[str, float] = field(default_factory=dict, hash=False)
 
 
 def read_cases(top: Table, folder: Path) -> list[Case]:
@@ -112,12 +118,12 @@ def _family(table: Table, folder: Path) -> Iterator[Case]:
             table,
             str((folder / instance).resolve()) if key == "file" else instance,
             label=label.format(**chosen),
-            objective=_objective(objective.format(**chosen), folder),
+            objective=with_absolute_path(objective.format(**chosen), folder),
         )
 
 
 def _collection(table: Table, folder: Path) -> Iterator[Case]:
-    for key in ("for", "class", "optimum"):
+    for key in ("for", "class", "optimum", "orders"):
         if key in table.entries:
             table.refuse(key, "has no meaning for a collection, whose members say it")
     name = table.text("collection")
@@ -166,7 +172,7 @@ def read_collection(path: Path) -> list[Case]:
     cases = []
     for table in top.tables("members"):
         table.known(*_MEMBER_KEYS)
-        objective = _objective(table.text("objective", "cardinality"), path.parent)
+        objective = with_absolute_path(table.text("objective", "cardinality"), path.parent)
         cases.append(
             _case(table, table.text("instance"), label=table.text("class", path.stem), objective=objective)
         )
@@ -179,11 +185,7 @@ def _case(table: Table, instance: str, *, label: str, objective: str) -> Case:
         known = None if optimum is None else Fraction(optimum)
     except (TypeError, ValueError, ZeroDivisionError):
         table.refuse("optimum", f"is a number or a rational as text, not {optimum!r}")
-    sense = table.text("sense", choices=("min", "max")) if "sense" in table.entries else None
-    try:
-        read = read_objective(objective, sense)
-    except InputError as error:
-        table.refuse("objective", f"cannot be used: {error}")
+    read = checked_objective(table, "objective", objective, sense_of(table))
     return Case(
         instance,
         label,
@@ -192,10 +194,48 @@ def _case(table: Table, instance: str, *, label: str, objective: str) -> Case:
         table.flag("spanning", False),
         table.text("formulation", "2"),
         known,
+        _orders(table),
     )
 
 
-def _objective(text: str, folder: Path) -> str:
+def _orders(table: Table) -> dict[str, float]:
+    """Read exponents of the number of points, such as { columns = 3, rows = 6 }."""
+    given = table.entries.get("orders", {})
+    if not isinstance(given, dict):
+        table.refuse("orders", "is a table of exponents, such as orders = { columns = 3, rows = 2 }")
+    for measure, exponent in given.items():
+        if measure not in MEASURES:
+            table.refuse("orders", f"speaks of '{measure}', but what grows is {', '.join(MEASURES)}")
+        if isinstance(exponent, bool) or not isinstance(exponent, int | float):
+            table.refuse("orders", f"gives '{measure}' an exponent, not {exponent!r}")
+    return dict(given)
+
+
+def sense_of(table: Table) -> str | None:
+    """Return the sense that a table gives to its objective, if any."""
+    return table.text("sense", choices=("min", "max")) if "sense" in table.entries else None
+
+
+def checked_objective(table: Table, key: str, text: str, sense: str | None = None) -> ObjectiveName:
+    """Read the objective that stands at a key of a table, and the sense beside it.
+
+    Raises
+    ------
+    PlanError
+        There is no such measure, or the sense is not that of the bottleneck.
+    """
+    try:
+        read = read_objective(text)
+        refuse_unknown(MeasureName.parse(read.measure))
+    except InputError as error:
+        table.refuse(key, f"cannot be used: {error}")
+    try:
+        return read_objective(text, sense)
+    except InputError as error:
+        table.refuse("sense", f"cannot be used: {error}")
+
+
+def with_absolute_path(text: str, folder: Path) -> str:
     """Return an objective with the path of its file made absolute."""
     file = objective_file(text)
     return text if file is None else text.replace(file, str((folder / file).resolve()), 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +132,8 @@ def manifest_of(plan: Plan, tasks: list[Task]) -> dict[str, Any]:
         "variants": [
             {"name": v.name, "role": v.role, "family": v.family, **v.settings()} for v in plan.variants
         ],
+        "measures": list(plan.measures),
+        "figures": [asdict(drawing) for drawing in plan.drawings],
         "runs": [
             {
                 "fingerprint": task.fingerprint,
@@ -142,6 +144,7 @@ def manifest_of(plan: Plan, tasks: list[Task]) -> dict[str, Any]:
                 "spanning": task.case.spanning,
                 "formulation": task.case.formulation,
                 "optimum": None if task.case.optimum is None else str(task.case.optimum),
+                "orders": task.case.orders,
                 "variant": task.variant.name,
             }
             for task in tasks

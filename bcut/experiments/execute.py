@@ -21,6 +21,7 @@ from typing import Any
 
 from bcut.errors import BcutError, InputError
 from bcut.experiments.ledger import LedgerWriter
+from bcut.experiments.measuring import delaunay, measured_at
 from bcut.experiments.recording import Recorder
 from bcut.experiments.tasks import code_version, digest_of, machine
 from bcut.experiments.variants import named
@@ -51,9 +52,11 @@ def carry_out(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes | None]:
     _check_version(task)
     started = time.time()
     run = _Run(task)
-    outcome = {"loop": run.loop, "root": run.root, "solve": run.solve, "plain": run.plain}[
-        task["settings"]["preset"]
-    ]()
+    presets = {
+        "loop": run.loop, "root": run.root, "solve": run.solve, "plain": run.plain, "sizes": run.sizes,
+        "delaunay": run.delaunay,
+    }  # fmt: skip
+    outcome = presets[task["settings"]["preset"]]()
     counts = {} if run.recorder is None else {name: asdict(c) for name, c in run.recorder.counts.items()}
     instance = {key: task["instance"][key] for key in ("name", "dimension", "digest")}
     record = {
@@ -63,6 +66,7 @@ def carry_out(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes | None]:
         "settings": task["settings"],
         "outcome": outcome,
         "cuts": counts,
+        **run.measured(),
         "code": task["code"],
         "machine": machine(),
         "started": started,
@@ -99,13 +103,14 @@ class _Run:
         self.started, self.processor = time.perf_counter(), time.process_time()
         self.recorder: Recorder | None = None
         self.ledger: bytes | None = None
+        self.triangulation: list[list[int]] | None = None
 
     def loop(self) -> dict[str, Any]:
         """Run the cutting-plane loop in HiGHS."""
         from bcut.bounds.root import RootLimits, root_bound
 
-        if self.settings["method"] == "orbits":
-            return self._by_orbits()
+        if self.settings["method"] != "listing":
+            return self._by_bound()
         formulation, objective = self._program()
         self._record(formulation)
         separation = self._separation(formulation)
@@ -127,7 +132,7 @@ class _Run:
             "bound": found.lp_after_cuts,
             "nodes": 0,
             "rounds": [[finished.lp, finished.cuts] for finished in found.rounds],
-            "columns": len(formulation.simplices),
+            **self._size(formulation),
             "columns_after_fixing": len(found.columns),
             "separators": own,
             "seconds": self._seconds(
@@ -165,7 +170,7 @@ class _Run:
             "lp": lps[0] if lps else None,
             "lp_after_cuts": lps[-1] if lps else None,
             "integral": tree.status == "optimal",
-            **self._of_tree(tree, objective, len(formulation.simplices), self._families(separation)),
+            **self._of_tree(tree, objective, formulation, self._families(separation)),
         }
 
     def plain(self) -> dict[str, Any]:
@@ -182,7 +187,7 @@ class _Run:
             "lp": lps[0] if lps else None,
             "lp_after_cuts": lps[-1] if lps else None,
             "integral": None,
-            **self._of_tree(tree, objective, len(formulation.simplices), {}),
+            **self._of_tree(tree, objective, formulation, {}),
         }
 
     def solve(self) -> dict[str, Any]:
@@ -204,9 +209,35 @@ class _Run:
         )
         if self.recorder is not None:
             self.ledger = self.recorder.finish()
+        self.triangulation = result.triangulation
         return self._of_result(result)
 
-    def _by_orbits(self) -> dict[str, Any]:
+    def delaunay(self) -> dict[str, Any]:
+        """Take the Delaunay triangulation, which has a value and no bound."""
+        self.triangulation, found = delaunay(
+            self.configuration, self.problem["objective"], self.problem["sense"]
+        )
+        return {**found, "seconds": self._seconds(lp=0.0, own={})}
+
+    def measured(self) -> dict[str, Any]:
+        """Return the triangulation and its measures, where measures are asked for."""
+        wanted, found = self.task["measures"], self.triangulation
+        if not wanted:
+            return {}
+        values = {} if found is None else measured_at(self.configuration, found, wanted)
+        return {"triangulation": found, "measures": values}
+
+    def sizes(self) -> dict[str, Any]:
+        """Count columns, rows and nonzeros, and solve nothing."""
+        from bcut.experiments.sizes import count
+
+        counted = count(
+            self._formulation_name(), self.configuration, self.problem["spanning"], self._deadline()
+        )
+        return {**counted, "seconds": self._seconds(lp=0.0, own={})}
+
+    def _by_bound(self) -> dict[str, Any]:
+        """Run the loop over orbits, or over the columns that multipliers leave."""
         from bcut.solving.api import bound
 
         result = bound(
@@ -216,7 +247,7 @@ class _Run:
             spanning=self.problem["spanning"],
             separators=self.settings["separators"],
             time_limit=self.settings["time_limit"],
-            method="orbits",
+            method=self.settings["method"],
         )
         return self._of_result(result)
 
@@ -224,9 +255,9 @@ class _Run:
 
     def _program(self) -> tuple[Any, Any]:
         from bcut.objectives.objective import Bottleneck, make_objective
-        from bcut.solving.programs import formulation_name, make_formulation
+        from bcut.solving.programs import make_formulation
 
-        name = formulation_name(self.problem["formulation"], dissection=False)
+        name = self._formulation_name()
         formulation = make_formulation(name, self.configuration, spanning=self.problem["spanning"])
         objective = make_objective(self.problem["objective"], formulation, sense=self.problem["sense"])
         if isinstance(objective, Bottleneck):
@@ -235,6 +266,19 @@ class _Run:
                 "them; take preset 'solve'"
             )
         return formulation, objective
+
+    def _formulation_name(self) -> str:
+        from bcut.solving.programs import formulation_name
+
+        return formulation_name(self.problem["formulation"], dissection=False)
+
+    def _size(self, formulation: Any) -> dict[str, int]:
+        """Return the size of the program as it was written: without rows that are added where they are violated."""
+        return {
+            "columns": len(formulation.simplices),
+            "rows": formulation.matrix.shape[0],
+            "nonzeros": int(formulation.matrix.nnz),
+        }
 
     def _record(self, formulation: Any) -> None:
         # In other formulations cuts may speak of more than d-simplices.
@@ -279,8 +323,10 @@ class _Run:
             "separation": sum(entry["seconds"] for entry in own.values()),
         }
 
-    def _of_tree(self, tree: Any, objective: Any, columns: int, own: dict[str, Any]) -> dict[str, Any]:
+    def _of_tree(self, tree: Any, objective: Any, formulation: Any, own: dict[str, Any]) -> dict[str, Any]:
         assert tree.solver is not None
+        if tree.columns is not None:
+            self.triangulation = formulation.simplices[sorted(tree.columns)].tolist()
         theirs = {f"scip:{name}": asdict(entry) for name, entry in tree.solver.separators.items()}
         return {
             "status": tree.status,
@@ -288,7 +334,7 @@ class _Run:
             "bound": tree.bound,
             "nodes": tree.nodes,
             "rounds": [[finished.lp, finished.cuts] for finished in tree.rounds],
-            "columns": columns,
+            **self._size(formulation),
             "columns_after_fixing": None,
             "separators": {**own, **theirs},
             "seconds": self._seconds(lp=tree.solver.lp_seconds, own={**own, **theirs}, aside=tree.watching),
@@ -307,6 +353,8 @@ class _Run:
             "nodes": result.nodes,
             "rounds": [[entry.lp, entry.cuts] for entry in result.root.rounds],
             "columns": result.size.columns,
+            "rows": result.size.rows,
+            "nonzeros": None,
             "columns_after_fixing": result.size.columns_after_fixing,
             "separators": own,
             "seconds": self._seconds(lp=in_root - sum(entry["seconds"] for entry in own.values()), own=own),

@@ -9,13 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from bcut.experiments.cases import Case, read_cases
+from bcut.experiments.cases import Case, checked_objective, read_cases, with_absolute_path
+from bcut.experiments.drawings import Drawing, read_drawings
 from bcut.experiments.reading import Table, read_toml
 from bcut.experiments.variants import Variant, ablation, read_variant
 
 _TOP = (
     "name", "description", "objective", "sense", "spanning", "formulation", "instances", "variants",
     "protocol", "separators", "preset", "scip", "cutoff", "time_limit", "memory_limit", "seed", "method", "ledger",
+    "measures", "figures",
 )  # fmt: skip
 
 Protocol = Literal["ablation"]
@@ -34,6 +36,10 @@ class Plan:
         With different names. Two of them may ask for the same run, which is then made once.
     protocol : str
         "ablation" or nothing.
+    measures : tuple of str
+        Objectives whose values at the triangulation of each run are recorded; files by absolute path.
+    drawings : tuple of Drawing
+        Figures of these measures in the report.
     text : str
         The file as it was read.
     """
@@ -43,6 +49,8 @@ class Plan:
     cases: tuple[Case, ...]
     variants: tuple[Variant, ...]
     protocol: str = ""
+    measures: tuple[str, ...] = ()
+    drawings: tuple[Drawing, ...] = ()
     text: str = field(default="", repr=False)
 
 
@@ -60,7 +68,9 @@ def read_plan(path: Path | str) -> Plan:
     top, text = read_toml(path)
     top.known(*_TOP)
     folder = path.parent.resolve()
-    common = {key: value for key, value in top.entries.items() if key not in ("instances", "variants")}
+    common = {
+        key: value for key, value in top.entries.items() if key not in ("instances", "variants", "figures")
+    }
     cases = read_cases(top, folder)
     protocol = top.text("protocol", choices=PROTOCOLS) if "protocol" in top.entries else ""
     variants: list[Variant] = []
@@ -74,14 +84,28 @@ def read_plan(path: Path | str) -> Plan:
     for position, name in enumerate(names):
         if name in names[:position]:
             top.refuse("variants", f"has the name '{name}' twice; names tell them apart in the report")
+    measures = _measures(top, folder)
     return Plan(
         name=top.text("name", path.stem),
         description=top.text("description", "-") if "description" in top.entries else "",
         cases=tuple(cases),
         variants=tuple(variants),
         protocol=protocol,
+        measures=measures,
+        drawings=read_drawings(top, measures, names, folder),
         text=text,
     )
+
+
+def _measures(top: Table, folder: Path) -> tuple[str, ...]:
+    found: list[str] = []
+    for text in top.texts("measures"):
+        checked_objective(top, "measures", text)
+        absolute = with_absolute_path(text, folder)
+        if absolute in found:
+            top.refuse("measures", f"has '{text}' twice")
+        found.append(absolute)
+    return tuple(found)
 
 
 def _inherited(table: Table, common: dict[str, Any]) -> Table:

@@ -24,7 +24,7 @@ SCHEMA = 1
 
 # Parts of the package that no result depends on; of the experiments, these do the work of a run.
 _ASIDE = ("cli", "plotting", "experiments")
-_AT_WORK = ("execute.py", "recording.py", "ledger.py")
+_AT_WORK = ("execute.py", "measuring.py", "sizes.py", "recording.py", "ledger.py")
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,14 @@ def tasks_of(plan: Plan) -> Iterator[Task]:
             "digest": configuration.digest,
         }
         for variant in plan.variants:
-            yield _task(case, variant, instance, code)
+            yield _task(variant.problem(case), variant, instance, code, plan.measures)
 
 
-def _task(case: Case, variant: Variant, instance: dict[str, Any], code: dict[str, str]) -> Task:
+def _task(
+    case: Case, variant: Variant, instance: dict[str, Any], code: dict[str, str], measures: tuple[str, ...]
+) -> Task:
     settings = variant.settings()
+    measures = measures if variant.has_triangulation else ()
     if variant.cutoff and case.optimum is None:
         raise InputError(
             f"variant '{variant.name}' asks for the optimum as a cutoff, but that of {case.instance} is not known; "
@@ -81,7 +84,8 @@ def _task(case: Case, variant: Variant, instance: dict[str, Any], code: dict[str
         "instance": instance,
         "problem": problem,
         "settings": settings,
-        "files": _files(case, variant),
+        "measures": list(measures),
+        "files": _files(case, variant, measures),
         "code": code,
     }
     identity = {**data, "instance": instance["digest"]}
@@ -89,13 +93,11 @@ def _task(case: Case, variant: Variant, instance: dict[str, Any], code: dict[str
     return Task(hashlib.sha256(text.encode()).hexdigest(), data, case, variant)
 
 
-def _files(case: Case, variant: Variant) -> dict[str, str]:
-    """Return the digests of files that a run reads: separators and costs."""
+def _files(case: Case, variant: Variant, measures: tuple[str, ...]) -> dict[str, str]:
+    """Return the digests of files that a run reads: separators, costs and users' objectives."""
     specifications = [Specification.parse(text) for text in variant.separators]
     paths = [specification.source for specification in specifications if specification.is_file]
-    costs = objective_file(case.objective)
-    if costs is not None:
-        paths.append(costs)
+    paths += [file for text in (case.objective, *measures) if (file := objective_file(text)) is not None]
     return {path: digest_of(Path(path)) for path in paths}
 
 

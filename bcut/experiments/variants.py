@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bcut.errors import BcutError
+from bcut.experiments.cases import Case, checked_objective, sense_of, with_absolute_path
 from bcut.experiments.reading import Table
 from bcut.separation.resolve import Specification, resolve
 
@@ -15,15 +16,24 @@ PRESETS = {
     "root": "SCIP's root node: no presolve, no restarts, no heuristics, its own separators only where named",
     "solve": "bcut solve",
     "plain": "SCIP with its own defaults on the exported model",
+    "sizes": "columns, rows by kind and nonzeros, counted; nothing is solved",
+    "delaunay": "the Delaunay triangulation; nothing is solved",
 }
 _KEYS = (
-    "name", "preset", "separators", "scip", "cutoff", "time_limit", "memory_limit", "seed", "method", "ledger",
+    "name", "preset", "objective", "sense", "separators", "scip", "cutoff", "time_limit", "memory_limit", "seed",
+    "method", "ledger",
 )  # fmt: skip
 _METHODS = {
     "loop": ("listing", "orbits", "fixing"),
     "solve": ("auto", "listing", "orbits", "fixing", "elimination", "scip"),
 }
 _UNLIMITED = ":unlimited"
+_WITHOUT_SEPARATORS = {
+    "plain": "it is SCIP alone",
+    "sizes": "it solves nothing",
+    "delaunay": "it solves nothing",
+}
+_WITH_BOTTLENECKS = ("solve", "delaunay")
 
 
 @dataclass(frozen=True)
@@ -34,7 +44,7 @@ class Variant:
     ----------
     name : str
         In tables; no part of what a run is identified by.
-    preset : {"loop", "root", "solve", "plain"}
+    preset : {"loop", "root", "solve", "plain", "sizes", "delaunay"}
     separators : tuple of str
         Ours, as on the command line; files by absolute path.
     scip : tuple of str
@@ -46,13 +56,17 @@ class Variant:
         Seconds, and GiB of address space, for each run.
     seed : int
     method : str
-        Of ``bcut solve``; "listing" or "orbits" for the preset "loop".
+        Of ``bcut solve``; "listing", "orbits" or "fixing" for the preset "loop".
     ledger : bool
         Whether cuts are recorded.
     role : str
         In an ablation: "none", "all", "only" or "without".
     family : str
         In an ablation: the separator that the role speaks of.
+    objective : str
+        In place of that of the instances; nothing for theirs.
+    sense : str
+        Of this objective: "min" or "max".
     """
 
     name: str
@@ -67,11 +81,25 @@ class Variant:
     ledger: bool = True
     role: str = ""
     family: str = ""
+    objective: str = ""
+    sense: str = ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what influences a run, as plain data."""
+        """Return what influences a run besides the problem, as plain data."""
         data = asdict(self)
-        return {key: data[key] for key in data if key not in ("name", "role", "family")}
+        aside = ("name", "role", "family", "objective", "sense")
+        return {key: data[key] for key in data if key not in aside}
+
+    @property
+    def has_triangulation(self) -> bool:
+        """Whether its runs may end with a triangulation, which has measures."""
+        return self.preset not in ("loop", "sizes")
+
+    def problem(self, case: Case) -> Case:
+        """Return the problem that this variant makes of a case; the optimum of the case is not that of another one."""
+        if not self.objective or (self.objective, self.sense) == (case.objective, case.sense):
+            return case
+        return replace(case, objective=self.objective, sense=self.sense, optimum=None)
 
 
 def read_variant(table: Table, folder: Path) -> Variant:
@@ -84,6 +112,7 @@ def read_variant(table: Table, folder: Path) -> Variant:
     table.known(*_KEYS)
     preset = table.text("preset", "loop", choices=PRESETS)
     method = _method(table, preset)
+    objective, sense = _objective(table, preset, folder)
     return Variant(
         name=table.text("name"),
         preset=preset,
@@ -95,15 +124,19 @@ def read_variant(table: Table, folder: Path) -> Variant:
         seed=_seed(table),
         method=method,
         ledger=_ledger(table, preset, method),
+        objective=objective,
+        sense=sense,
     )
 
 
 def ablation(top: Table, folder: Path) -> list[Variant]:
     """Expand the protocol: none of the separators, all, each alone, and all but each."""
-    entries = {key: value for key, value in top.entries.items() if key in _KEYS}
+    # At the top of a plan the objective is that of the instances.
+    aside = ("objective", "sense")
+    entries = {key: value for key, value in top.entries.items() if key in _KEYS and key not in aside}
     base = read_variant(Table({**entries, "name": "all"}, top.label, lines=top.lines), folder)
-    if base.preset == "plain":
-        top.refuse("preset", "'plain' has no separators to leave out")
+    if base.preset in _WITHOUT_SEPARATORS:
+        top.refuse("preset", f"'{base.preset}' has no separators to leave out")
     if not base.separators:
         top.refuse("separators", "is missing: an ablation says which separators it is about")
     families = [Specification.parse(text).source for text in base.separators]
@@ -121,10 +154,28 @@ def ablation(top: Table, folder: Path) -> list[Variant]:
     return variants
 
 
+def _objective(table: Table, preset: str, folder: Path) -> tuple[str, str]:
+    """Return objective and sense that take the place of those of the instances; two empty texts without them."""
+    sense = sense_of(table)
+    if "objective" not in table.entries:
+        if sense is not None:
+            table.refuse("sense", "belongs to an objective of this variant: write 'objective' too")
+        return "", ""
+    text = with_absolute_path(table.text("objective"), folder)
+    read = checked_objective(table, "objective", text, sense)
+    if read.is_bottleneck and preset not in _WITH_BOTTLENECKS:
+        table.refuse(
+            "objective",
+            f"'{text}' has no relaxation of its own, so it is for presets {' and '.join(_WITH_BOTTLENECKS)}, "
+            f"not '{preset}'",
+        )
+    return text, read.sense
+
+
 def _separators(table: Table, preset: str, folder: Path) -> tuple[str, ...]:
     given = table.texts("separators")
-    if preset == "plain" and given:
-        table.refuse("separators", "has no meaning with preset 'plain', which is SCIP alone")
+    if preset in _WITHOUT_SEPARATORS and given:
+        table.refuse("separators", f"has no meaning with preset '{preset}': {_WITHOUT_SEPARATORS[preset]}")
     absolute = [_absolute(text, folder) for text in given]
     for text in absolute:
         try:
@@ -195,5 +246,6 @@ def _seed(table: Table) -> int:
 
 def _ledger(table: Table, preset: str, method: str) -> bool:
     """Record cuts where bounds are studied; in whole solves, which are timed, only on request."""
-    possible = preset != "plain" and method != "orbits"
+    possible = preset not in _WITHOUT_SEPARATORS and method != "orbits"
+    possible &= preset != "loop" or method == "listing"
     return possible and table.flag("ledger", preset in ("loop", "root"))

@@ -30,7 +30,7 @@ def first_triangulation(configuration: PointConfiguration, chirotope: Chirotope)
     ndarray of int64, shape (k, d + 1)
         Ascending simplices, in colexicographic order.
     """
-    found = _delaunay(configuration)
+    found = qhull_simplices(configuration)
     if found is not None and len(np.unique(found)) == configuration.n and is_triangulation(found, chirotope):
         return found
     if configuration.dimension == 2:
@@ -38,7 +38,18 @@ def first_triangulation(configuration: PointConfiguration, chirotope: Chirotope)
     return placing_triangulation(configuration, chirotope)
 
 
-def _delaunay(configuration: PointConfiguration) -> NDArray[np.int64] | None:
+def qhull_simplices(configuration: PointConfiguration) -> NDArray[np.int64] | None:
+    """Return what Qhull takes for the Delaunay triangulation, in floating point, or None where it gives up.
+
+    Parameters
+    ----------
+    configuration : PointConfiguration
+
+    Returns
+    -------
+    ndarray of int64, shape (k, d + 1), or None
+        Ascending simplices, in colexicographic order.
+    """
     from scipy.spatial import Delaunay, QhullError
 
     if configuration.dimension < 2:

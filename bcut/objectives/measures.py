@@ -66,14 +66,7 @@ def measured(text: str, configuration: PointConfiguration, simplices: Simplices)
     name = MeasureName.parse(text)
     if name.is_file:
         return costs_of_function(text, configuration, simplices)
-    if name.source not in MEASURES:
-        near = difflib.get_close_matches(name.source, MEASURES, n=1)
-        hint = (
-            f"did you mean '{near[0]}'?"
-            if near
-            else f"known are {', '.join(sorted(MEASURES))}; a file is given by its path"
-        )
-        raise InputError(f"unknown objective '{name.source}': {hint}")
+    refuse_unknown(name)
     costs = MEASURES[name.source](configuration, simplices, name.argument)
     if isinstance(costs, np.ndarray) and costs.dtype.kind == "f":
         beyond = np.flatnonzero(~np.isfinite(costs))
@@ -83,6 +76,25 @@ def measured(text: str, configuration: PointConfiguration, simplices: Simplices)
                 "beyond the range of float64; scale the points"
             )
     return costs
+
+
+def refuse_unknown(name: MeasureName) -> None:
+    """Refuse a measure that is neither known by its name nor a file.
+
+    Raises
+    ------
+    InputError
+        With the name that may have been meant, or all that are known.
+    """
+    if name.is_file or name.source in MEASURES:
+        return
+    near = difflib.get_close_matches(name.source, MEASURES, n=1)
+    hint = (
+        f"did you mean '{near[0]}'?"
+        if near
+        else f"known are {', '.join(sorted(MEASURES))}; a file is given by its path"
+    )
+    raise InputError(f"unknown objective '{name.source}': {hint}")
 
 
 @measure("cardinality")

@@ -15,7 +15,7 @@ from bcut.experiments.reporting.runs import Experiment, mean
 from bcut.experiments.reporting.tables import Table
 
 # Told apart by colour and by the pattern of their lines, also in print.
-_COLOURS = (
+COLOURS = (
     "#33658a",
     "#d1603d",
     "#4f9d69",
@@ -30,7 +30,7 @@ _COLOURS = (
 _DASHES = ("-", "--", "-.", ":")
 _LP, _SEPARATION, _ELSEWHERE = "#33658a", "#d1603d", "#c9ccd3"
 _WIDTH = 8.0
-_STYLE: Any = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"],
@@ -46,7 +46,7 @@ _STYLE: Any = {
 def svg(figure: Figure, name: str) -> str:
     """Return a figure as an SVG element; `name` keeps its ids apart from those of other figures on the page."""
     stream = io.StringIO()
-    with rc_context({**_STYLE, "svg.hashsalt": name}):
+    with rc_context({**STYLE, "svg.hashsalt": name}):
         figure.savefig(stream, format="svg", metadata={"Date": None}, bbox_inches="tight", pad_inches=0.08)
     text = stream.getvalue()
     text = text[text.index("<svg") :]
@@ -72,8 +72,8 @@ def _logarithmic(axes: Axes) -> None:
 
 def _line(position: int) -> dict[str, Any]:
     return {
-        "color": _COLOURS[position % len(_COLOURS)],
-        "linestyle": _DASHES[position // len(_COLOURS) % len(_DASHES)],
+        "color": COLOURS[position % len(COLOURS)],
+        "linestyle": _DASHES[position // len(COLOURS) % len(_DASHES)],
         "linewidth": 1.8,
     }
 
@@ -87,7 +87,7 @@ def gap_chart(variants: Table) -> str | None:
     rows = [row for row in variants if row["gap_closed"] is not None][::-1]
     if not rows:
         return None
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure, axes = _axes(_bars_height(len(rows)))
         shares = [100 * row["gap_closed"] for row in rows]
         bars = axes.barh([row["variant"] for row in rows], shares, color=_LP, height=0.7)
@@ -114,7 +114,7 @@ def rounds_chart(experiment: Experiment) -> str | None:
             ]
     if not curves:
         return None
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure, axes = _axes(4.2)
         for position, (name, shares_by_round) in enumerate(curves.items()):
             numbers = range(1, len(shares_by_round) + 1)
@@ -131,7 +131,7 @@ def times_chart(times: Table) -> str | None:
     rows = [row for row in times if row["seconds"] > 0][::-1]
     if not rows:
         return None
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure, axes = _axes(_bars_height(len(rows)) + 0.5)
         names = [row["variant"] for row in rows]
         left = [0.0] * len(rows)
@@ -154,7 +154,7 @@ def profile_chart(profile: Table, kind: str) -> str | None:
     names = list(dict.fromkeys(row["variant"] for row in profile if row["kind"] == kind))
     if not names:
         return None
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure, axes = _axes(4.2)
         most = max(row["factor"] for row in profile if row["kind"] == kind)
         for position, name in enumerate(names):
@@ -175,7 +175,7 @@ def ablation_chart(ablation: Table) -> str | None:
     rows = [row for row in ablation if row["gain_alone"] is not None or row["loss_without"] is not None][::-1]
     if not rows:
         return None
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure, axes = _axes(_bars_height(2 * len(rows)) + 0.3)
         places = range(len(rows))
         for key, label, colour, shift in (

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bcut.errors import ExperimentError, InputError
+from bcut.experiments.reporting.measures import Figure, figures
 from bcut.experiments.reporting.runs import Experiment, load_experiment
 from bcut.experiments.reporting.tables import Row, Table, all_tables
 from bcut.files.atomic import replacing, write_text
@@ -20,6 +21,11 @@ _ON_PAGE = 400
 
 _TITLES = {
     "variants": "Variants",
+    "measures": "Triangulations",
+    "measured": "Measures of each run",
+    "classes": "Classes",
+    "sizes": "Sizes",
+    "growth": "Growth",
     "gap": "Gap closed, by class of instances",
     "ablation": "Ablation",
     "families": "Cuts",
@@ -33,7 +39,7 @@ _TITLES = {
 _SHARES = {"gap_closed", "least", "alone", "without", "gain_alone", "loss_without", "share"}
 _TIMES = {
     "seconds", "processor_seconds", "seconds_lp", "seconds_separation", "seconds_elsewhere", "seconds_alone",
-    "seconds_without", "factor",
+    "seconds_without", "factor", "longest",
 }  # fmt: skip
 _HIDDEN = {"fingerprint", "trace"}
 
@@ -51,7 +57,7 @@ def write_report(folder: Path | str, output: Path | str | None = None) -> list[P
     Returns
     -------
     list of Path
-        What was written: report.html, and each table as CSV and Parquet.
+        What was written: report.html, each table as CSV and Parquet, and each figure of the plan as SVG.
 
     Raises
     ------
@@ -79,8 +85,13 @@ def write_report(folder: Path | str, output: Path | str | None = None) -> list[P
             _write_csv(target / f"{name}.csv", table),
             _write_parquet(target / f"{name}.parquet", table),
         ]
+    drawn = figures(experiment)
+    for figure in drawn:
+        path = target / f"{figure.name}.svg"
+        write_text(path, figure.svg)
+        written.append(path)
     page = target / "report.html"
-    write_text(page, render(experiment, tables))
+    write_text(page, render(experiment, tables, drawn))
     return [page, *written]
 
 
@@ -96,7 +107,7 @@ def _check_libraries() -> None:
     del jinja2, matplotlib, pyarrow
 
 
-def render(experiment: Experiment, tables: dict[str, Table]) -> str:
+def render(experiment: Experiment, tables: dict[str, Table], drawn: list[Figure]) -> str:
     """Return the page as text; it needs no other file."""
     from jinja2 import Environment, StrictUndefined
 
@@ -136,6 +147,7 @@ def render(experiment: Experiment, tables: dict[str, Table]) -> str:
         missing=experiment.missing,
         failures=experiment.failures,
         charts={name: chart for name, chart in charts.items() if chart},
+        drawn=drawn,
         heat=_heat(experiment, tables.get("gap", [])),
         tables={
             name: {

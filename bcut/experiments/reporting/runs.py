@@ -54,6 +54,12 @@ class Run:
         return str(self.entry["variant"])
 
     @property
+    def measures(self) -> dict[str, float]:
+        """Values of the plan's measures at the triangulation that the run ended with; none without it."""
+        found: dict[str, float] = self.record.get("measures", {})
+        return found
+
+    @property
     def label(self) -> str:
         """Class of the instance."""
         return str(self.entry["class"])
@@ -72,6 +78,11 @@ class Run:
     def is_root(self) -> bool:
         """Whether the run is about a root bound."""
         return self.record["settings"]["preset"] in _ROOT_PRESETS
+
+    @property
+    def only_counts(self) -> bool:
+        """Whether nothing was to be solved."""
+        return bool(self.record["settings"]["preset"] == "sizes")
 
     @property
     def has_gap(self) -> bool:
@@ -130,6 +141,16 @@ class Experiment:
     def variants(self) -> list[str]:
         """Names of the variants, in the order of the plan."""
         return [variant["name"] for variant in self.manifest["variants"]]
+
+    @property
+    def measures(self) -> list[str]:
+        """What the plan measures triangulations by."""
+        return list(self.manifest.get("measures", []))
+
+    @property
+    def drawings(self) -> list[dict[str, Any]]:
+        """The figures that the plan asks for."""
+        return list(self.manifest.get("figures", []))
 
     @property
     def labels(self) -> list[str]:
@@ -199,4 +220,5 @@ def shifted_geometric_mean(values: Sequence[float], shift: float) -> float | Non
     """Return ``exp(mean(log(values + shift))) - shift``; None of nothing."""
     if not values:
         return None
-    return exp(sum(log(value + shift) for value in values) / len(values)) - shift
+    # Rounding must not make it negative, as values never are.
+    return max(0.0, exp(sum(log(value + shift) for value in values) / len(values)) - shift)

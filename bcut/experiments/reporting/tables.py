@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+from bcut.experiments.reporting.measures import measured_table, measures_table
 from bcut.experiments.reporting.runs import Experiment, Run, mean, shifted_geometric_mean
+from bcut.experiments.reporting.sizes import classes_table, growth_table, sizes_table
 
 Row = dict[str, Any]
 Table = list[Row]
@@ -18,16 +21,21 @@ def all_tables(experiment: Experiment) -> dict[str, Table]:
     """Return every table by its name; those without rows are left out."""
     makers: dict[str, Callable[[Experiment], Table]] = {
         "variants": variants_table,
+        "measures": measures_table,
+        "classes": classes_table,
         "gap": gap_table,
         "ablation": ablation_table,
         "families": families_table,
         "times": times_table,
         "profile": profile_table,
         "rounds": rounds_table,
+        "measured": measured_table,
         "runs": runs_table,
         "failures": lambda found: found.failures,
     }
-    tables = {name: make(experiment) for name, make in makers.items()}
+    solving = replace(experiment, runs=[run for run in experiment.runs if not run.only_counts])
+    tables = {name: make(solving) for name, make in makers.items()}
+    tables |= {"sizes": sizes_table(experiment), "growth": growth_table(experiment)}
     return {name: table for name, table in tables.items() if table}
 
 
