@@ -70,27 +70,22 @@ def growth(folder: Path) -> Iterator[str]:
 def solves(folder: Path) -> Iterator[str]:
     """Yield Table 2 or 3: sizes, integral relaxations, and processor time of the relaxation and of ``bcut solve``."""
     rows = read(folder, "classes")
-    paper = PAPER[folder.name]
     yield (
-        "| points | sets | rows | columns | nonzeros | integral | LP, s | `bcut solve`, s | columns in the paper "
+        "| points | rows | columns | nonzeros | integral | relaxation, s | `bcut solve`, s | columns in the paper "
         "| its seconds |"
     )
-    yield "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
+    yield "|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
     for label in dict.fromkeys(row["class"] for row in rows):
         own = {row["variant"]: row for row in rows if row["class"] == label}
-        if set(own) != {"LP", "bcut"}:
-            continue
-        lp, points = own["LP"], int(float(own["LP"]["points"]))
-        columns, seconds = paper[points]
-        cells = [
-            str(points),
-            lp["runs"],
-            *(f"{float(lp[name]):,.0f}" for name in ("rows", "columns", "nonzeros")),
-        ]
-        cells += [
-            lp["integral"],
-            *(f"{float(own[name]['processor_seconds']):.2f}" for name in ("LP", "bcut")),
-        ]
+        some, alone = next(iter(own.values())), own.get("LP")
+        points = int(float(some["points"]))
+        cells = [str(points), *(f"{float(some[name]):,.0f}" for name in ("rows", "columns"))]
+        cells += ["–", "–"] if alone is None else [
+            f"{float(alone['nonzeros']):,.0f}", f"{alone['integral']} of {alone['runs']}"
+        ]  # fmt: skip
+        for name in ("LP", "bcut"):
+            cells.append(f"{float(own[name]['processor_seconds']):.2f}" if name in own else "–")
+        columns, seconds = PAPER[folder.name][points]
         yield "| " + " | ".join([*cells, f"{columns:,}", f"{seconds:,.2f}"]) + " |"
 
 
