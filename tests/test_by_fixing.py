@@ -223,6 +223,14 @@ def test_large_ones_are_solved_this_way_and_verify(tmp_path: Path) -> None:
     assert float(verified.exact_bound) == pytest.approx(result.value, rel=2e-9)
 
 
+def test_a_triangulation_far_from_the_bound_asks_for_a_few_more_columns_first() -> None:
+    # The relaxation is fractional, and no column of the first small program leads to a better triangulation than flips.
+    found = bcut.solve("random:40,3,seed=9", objective="weight", spanning=True, time_limit=100)
+    assert found.status == "optimal"
+    assert found.size.columns_after_fixing is not None
+    assert found.size.columns_after_fixing < found.size.columns // 4
+
+
 @pytest.mark.parametrize(
     ("objective", "sense"), [("cardinality", "min"), ("weight", "min"), ("weight", "max")]
 )

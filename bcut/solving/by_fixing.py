@@ -38,6 +38,8 @@ _GAPS, _LEAST, _IN_USE = 0.7, 1e-5, 0.01
 _ROOM_FOR_CUTS = 10
 # A small program that would become larger than this, and this many times larger, waits for better multipliers.
 _MOST, _GROWTH = 20_000, 2.0
+# So many times more columns are taken where a triangulation that is far from the bound asks for nearly all.
+_STEP = 4
 # The gap between the smallest two values, relative to the bound, from which on targets are better than a threshold.
 _LARGE_UNIT = 1e-3
 
@@ -272,7 +274,14 @@ class _Fixing:
             assert search.value is not None
             threshold = search.sign * search.value - self.bound.bound.value
             needed = len(self.bound.bound.columns_within(search.sign * search.value))
-            if needed <= max(_MOST, _GROWTH * size) or tolerance <= _SHARPEST:
+            if needed <= max(_MOST, _GROWTH * size):
+                return threshold, tolerance
+            more = _STEP * size
+            if more <= max(_MOST, needed // _STEP):
+                # The triangulation is far from the bound: a better one is likely among a few more columns.
+                reduced = self.bound.bound.reduced_costs
+                return int(np.partition(reduced, more)[more]) * self.bound.bound.unit, tolerance
+            if tolerance <= _SHARPEST:
                 return threshold, tolerance
             tolerance *= _SHARPER
             if not self._sharpen(tolerance):
