@@ -117,6 +117,11 @@ class Certificate:
         ``{"target": rational, "stages": [{"multipliers": ..., "cuts": ...}, ...]}``: no triangulation reaches the
         target. Each stage speaks of the simplices whose reduced costs in the one before (first: in this certificate) a
         triangulation within the target may have; the last one's bound is beyond the target.
+        With symmetries, ``{"target": rational, "case": {"stages": ..., "face": vertices, "chosen": case, "excluded":
+        case}}``: the triangulations that have the face, and those that have none of its images. The stages' multipliers
+        belong to all images of a row, or to the mean of the images of a cut and of the coverage row, under the
+        symmetries that are left: those that take all faces chosen so far to themselves. For a cut, "group" counts the
+        faces that matter.
     reason : str or None
     """
 

@@ -6,7 +6,12 @@ import pytest
 
 import bcut
 from bcut.errors import InputError
+from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.geometry.placing import placing_triangulation
+from bcut.instance import load_instance
+from bcut.objectives.objective import make_objective
 from bcut.solving import by_orbits, methods
+from bcut.solving.search import Part, Search
 
 CASES = [
     ("cube:3", False),
@@ -87,3 +92,21 @@ def test_orbits_refuse_what_is_not_known_to_be_invariant() -> None:
         bcut.solve("cube:3", objective="random-costs:1", method="orbits")
     with pytest.raises(InputError, match="solve only"):
         bcut.bound("cube:3", method="scip")
+
+
+def test_the_tree_search_after_vain_attempts_starts_from_its_own_program(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    everything = cocircuit_formulation(load_instance("dodecahedron"))
+    known = everything.columns_of(placing_triangulation(everything.configuration, everything.chirotope))
+
+    def improve_in_another_program(search: Search, *_: object) -> None:
+        search.whole = Part.whole(everything, make_objective("cardinality", everything))
+        search.columns = known
+        assert known.max() > search.columns_after_fixing, "no column of the program that comes next"
+
+    monkeypatch.setattr(by_orbits, "_SMALL", 0)
+    monkeypatch.setattr(by_orbits, "_search_invariant", lambda search, stage, **limits: None)
+    monkeypatch.setattr(by_orbits, "_improve", improve_in_another_program)
+    result = bcut.solve("dodecahedron", method="orbits")
+    assert (result.status, result.value, result.bound) == ("optimal", 23, 23)

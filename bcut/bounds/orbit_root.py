@@ -16,14 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bcut.bounds.large_program import LARGE, solve_large_program
 from bcut.bounds.linear_program import LinearProgram, solve_linear_program
-from bcut.formulations.orbit_cocircuits import OrbitFormulation
 from bcut.objectives.objective import Objective
 
 if TYPE_CHECKING:
@@ -33,6 +32,38 @@ if TYPE_CHECKING:
 SHIFT = 45
 # Larger volumes are compared with the hull's volume, in integers of any size.
 _LARGE = 1 << 40
+
+
+class OrbitProgram(Protocol):
+    """Whatever is a program over orbits, such as `bcut.formulations.orbit_cocircuits.OrbitFormulation`.
+
+    With the sums X of x over the orbits: ``matrix @ X = 0``, ``volumes @ X = volume``, ``cuts @ X <= 0`` where there
+    are cuts, and 0 <= X <= sizes.
+    """
+
+    @property
+    def simplices(self) -> NDArray[np.int64]:
+        """One of each orbit, shape (m, d + 1)."""
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Lengths of the orbits, shape (m,)."""
+
+    @property
+    def matrix(self) -> sp.csr_matrix:
+        """Cocircuit rows, of integers."""
+
+    @property
+    def volumes(self) -> NDArray[Any]:
+        """Integers, shape (m,)."""
+
+    @property
+    def volume(self) -> int:
+        """Positive."""
+
+    @property
+    def cuts(self) -> sp.csr_matrix | None:
+        """Of integers, shape (cuts, m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +118,7 @@ class OrbitRoot:
 
 
 def orbit_root(
-    formulation: OrbitFormulation,
+    formulation: OrbitProgram,
     objective: Objective,
     *,
     method: Literal["simplex", "interior"] = "simplex",
@@ -97,7 +128,7 @@ def orbit_root(
 
     Parameters
     ----------
-    formulation : OrbitFormulation
+    formulation : OrbitProgram
     objective : Objective
         Of the representatives ``formulation.simplices``; invariant under the group.
     method : {"simplex", "interior"}
@@ -121,7 +152,7 @@ def orbit_root(
     return OrbitRoot("optimal", objective.sign * solution.value, solution.x, bound)
 
 
-def _program(formulation: OrbitFormulation, objective: Objective) -> LinearProgram:
+def _program(formulation: OrbitProgram, objective: Objective) -> LinearProgram:
     """Return the program with the coverage row first, divided by the hull's volume.
 
     X <= |o| is left out: the other rows imply it, as each simplex contains a generic point, and each generic point is
@@ -143,7 +174,7 @@ def _program(formulation: OrbitFormulation, objective: Objective) -> LinearProgr
     return LinearProgram(objective.sign * objective.costs, matrix, lower, upper)
 
 
-def _unscaled(formulation: OrbitFormulation, duals: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unscaled(formulation: OrbitProgram, duals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the duals of the rows as they are, from those of `_program`, whose cuts have entries of size 1."""
     if formulation.cuts is None:
         return duals
@@ -152,13 +183,13 @@ def _unscaled(formulation: OrbitFormulation, duals: NDArray[np.float64]) -> NDAr
 
 
 def safe_orbit_bound(
-    formulation: OrbitFormulation, objective: Objective, duals: NDArray[np.floating], coverage: float
+    formulation: OrbitProgram, objective: Objective, duals: NDArray[np.floating], coverage: float
 ) -> OrbitBound:
     """Turn floating-point multipliers into an exact bound.
 
     Parameters
     ----------
-    formulation : OrbitFormulation
+    formulation : OrbitProgram
     objective : Objective
     duals : ndarray of float, shape (rows + cuts,)
         Any numbers; good ones give good bounds. For the minimisation of ``sign * objective``.
@@ -191,7 +222,7 @@ def safe_orbit_bound(
     return OrbitBound(Fraction(total, denominator), multipliers, chosen, left, denominator)
 
 
-def _columns(formulation: OrbitFormulation) -> sp.csr_matrix:
+def _columns(formulation: OrbitProgram) -> sp.csr_matrix:
     """Return the cocircuit rows and the cuts."""
     import scipy.sparse as sp
 
@@ -200,7 +231,7 @@ def _columns(formulation: OrbitFormulation) -> sp.csr_matrix:
 
 
 def _with_coverage(
-    formulation: OrbitFormulation, reduced: NDArray[Any], cover: int
+    formulation: OrbitProgram, reduced: NDArray[Any], cover: int
 ) -> tuple[int, NDArray[Any], int]:
     """Return the bound and the reduced costs with a multiplier of the volume row, over the denominator."""
     left = reduced - formulation.volumes * cover

@@ -63,13 +63,13 @@ def invariant_program(formulation: Formulation, subgroup: PermutationGroup) -> I
 
     n = formulation.configuration.n
     columns = len(formulation.simplices)
-    orbit_of = _orbits(formulation.simplices, subgroup, n)
+    orbit_of = set_orbits(formulation.simplices, subgroup, n)
     count = int(orbit_of.max(initial=-1)) + 1
     gather = sp.csr_matrix(
         (np.ones(columns, dtype=np.int32), (np.arange(columns), orbit_of)), shape=(columns, count)
     )
     faces = np.array(formulation.row_faces[1:], dtype=np.int64).reshape(-1, formulation.chirotope.dimension)
-    row_orbit = _orbits(faces, subgroup, n)
+    row_orbit = set_orbits(faces, subgroup, n)
     rows = np.concatenate(([0], 1 + np.unique(row_orbit, return_index=True)[1])).astype(np.int64)
     matrix = (formulation.matrix[rows].astype(np.int32) @ gather).tocsr()
     matrix.eliminate_zeros()
@@ -94,8 +94,22 @@ def invariant_program(formulation: Formulation, subgroup: PermutationGroup) -> I
     )
 
 
-def _orbits(sets: NDArray[np.int64], group: PermutationGroup, n: int) -> NDArray[np.int64]:
-    """Give numbers to the orbits of some sets of points, (m, k) to (m,); images outside the list are ignored."""
+def set_orbits(sets: NDArray[np.int64], group: PermutationGroup, n: int) -> NDArray[np.int64]:
+    """Give numbers to the orbits of some sets of points, in the order of their first members.
+
+    Parameters
+    ----------
+    sets : ndarray of int64, shape (m, k)
+        Ascending rows.
+    group : PermutationGroup
+        Images that are not in the list are ignored.
+    n : int
+        Number of points.
+
+    Returns
+    -------
+    ndarray of int64, shape (m,)
+    """
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
 

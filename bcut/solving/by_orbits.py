@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from math import comb, inf
 from typing import Literal
@@ -14,15 +15,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bcut.bounds.averaged import AveragedPart
 from bcut.errors import TooLargeError
 from bcut.formulations.partial_cocircuits import partial_cocircuit_formulation
+from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.partial_chirotope import PartialChirotope
 from bcut.geometry.permutations import PermutationGroup
 from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import make_objective
 from bcut.separation.driver import FamilyStatistics
-from bcut.solving.certificates import make_orbit_certificate
+from bcut.solving.certificates import case_data, make_orbit_certificate
 from bcut.solving.invariant_search import PASSES, find_invariant_triangulation
+from bcut.solving.orbit_branching import branch_over_faces
 from bcut.solving.orbit_stage import OrbitStage
 from bcut.solving.search import Part, Search, branch
 from bcut.solving.strategies import is_optimal
@@ -37,6 +41,10 @@ _MOST_TO_IMPROVE = 60_000
 _SECONDS_TO_IMPROVE = 60.0
 # Of the time that is left, for invariant triangulations that reach the bound.
 _SHARE_FOR_TARGET = 0.4
+# Branching over faces lists the signs of all sets of d + 1 points; its share of the time that is left, and its time
+# where there is no limit; how long it may look for an exact proof of what SCIP has refuted already.
+_MOST_SIGNS = 1_000_000
+_SHARE_FOR_FACES, _SECONDS_FOR_FACES, _SECONDS_FOR_PROOF = 0.4, 600.0, 60.0
 
 
 def known_triangulation(stage: OrbitStage) -> Part:
@@ -136,7 +144,7 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
         search.whole, search.columns = Part.whole(formulation, costs), None
         search.columns_after_fixing = len(formulation.simplices)
         try:
-            outcome = _reach(search, stage, target, best)
+            outcome = _reach(search, stage, target, best, cuts)
         finally:
             # Also after Ctrl-C: what is handed out is a triangulation in any case.
             best.keep(search)
@@ -225,7 +233,7 @@ def solve_invariant(
 
 
 def _reach(
-    search: Search, stage: OrbitStage, target: Fraction, best: _Best
+    search: Search, stage: OrbitStage, target: Fraction, best: _Best, cuts: bool
 ) -> Literal["reached", "refuted", "limit", "interrupted"]:
     """Look for a triangulation of the target value, times sign, on the columns that may be in one."""
     part = search.whole
@@ -233,6 +241,10 @@ def _reach(
     decided = ""
     if len(part.columns) <= _SMALL:
         decided = _branch(search, part, cutoff, seconds=_SECONDS_FOR_SMALL)
+        if decided != "interrupted" and not is_optimal(search):
+            known = decided == "infeasible"
+            if _branch_over_faces(search, stage, target, cuts=cuts, known=known):
+                return "refuted"
     if decided in ("", "limit") and not is_optimal(search):
         left = search.seconds_left
         seconds = inf if left is None else _SHARE_FOR_TARGET * left
@@ -241,15 +253,59 @@ def _reach(
         return "reached"
     if decided not in ("infeasible", "interrupted"):
         _improve(search, stage, target, best)
-        search.whole = part
         if is_optimal(search):
             return "reached"
+        # The best triangulation is one of another program.
+        search.whole, search.columns = part, None
         decided = _branch(search, part, cutoff)
     if is_optimal(search):
         return "reached"
     if decided == "infeasible":
         return "refuted"
     return "interrupted" if decided == "interrupted" else "limit"
+
+
+def _branch_over_faces(
+    search: Search, stage: OrbitStage, target: Fraction, *, cuts: bool, known: bool
+) -> bool:
+    """Look for a triangulation within the target by cases that keep symmetry; tell whether there is provably none.
+
+    Then the certificate has the proof. `known` says that there is none, so that a proof is all that is missing.
+    """
+    configuration, part = stage.configuration, search.whole
+    if comb(configuration.n, configuration.dimension + 1) > _MOST_SIGNS:
+        return False
+    left = search.seconds_left
+    seconds = _SECONDS_FOR_FACES if left is None else _SHARE_FOR_FACES * left
+    deadline = time.monotonic() + (min(seconds, _SECONDS_FOR_PROOF) if known else seconds)
+    before = search.nodes
+
+    def on_part(number: int) -> None:
+        search.nodes = before + number
+        search.report("faces", columns=len(part.columns), nodes=search.nodes)
+
+    with search.timed("faces"):
+        everything = AveragedPart(
+            replace(part.formulation, chirotope=Chirotope.of(configuration)),
+            part.objective,
+            stage.flag,
+            stage.group,
+            np.arange(len(part.columns)),
+        )
+        found = branch_over_faces(
+            everything,
+            target,
+            separating=cuts,
+            seconds=lambda: deadline - time.monotonic(),
+            on_part=on_part,
+        )
+    if found.columns is not None:
+        search.offer(found.columns)
+    if found.case is None or search.certificate is None:
+        return False
+    refutes = {"target": str(search.sign * target), "case": case_data(found.case)}
+    search.certificate = replace(search.certificate, refutes=refutes)
+    return True
 
 
 def _branch(search: Search, part: Part, cutoff: Fraction, *, seconds: float | None = None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+from bcut.bounds.averaged_root import AveragedStage
 from bcut.bounds.infeasibility import infeasibility_bound
 from bcut.bounds.root import Stage
 from bcut.bounds.safe import SafeBound
@@ -12,6 +13,7 @@ from bcut.formulations.chambers import CHAMBER_ROW
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import Objective
 from bcut.result import Certificate
+from bcut.solving.orbit_branching import Case
 from bcut.solving.orbit_stage import OrbitStage
 
 
@@ -150,10 +152,43 @@ def make_orbit_certificate(stage: OrbitStage) -> Certificate:
     ]
     return Certificate(
         bound=str(stage.objective.sign * bound.value),
-        # An affine basis: the vertices of any simplex.
-        flag=formulation.simplices[0].tolist(),
+        flag=stage.flag.tolist(),
         multipliers=multipliers,
         cuts=cuts,
         symmetries=stage.group.generators.tolist(),
         volume_coefficient=formulation.volume_coefficient,
     )
+
+
+def case_data(case: Case) -> dict[str, object]:
+    """Write out a proof by cases, for `bcut.result.Certificate.refutes`."""
+    data: dict[str, object] = {"stages": [_averaged_stage_data(stage) for stage in case.stages]}
+    if case.split is not None:
+        data["face"] = list(case.split.face)
+        data["chosen"] = case_data(case.split.chosen)
+        data["excluded"] = case_data(case.split.excluded)
+    return data
+
+
+def _averaged_stage_data(stage: AveragedStage) -> dict[str, object]:
+    bound, rows = stage.bound, len(stage.row_faces)
+    multipliers: list[list[object]] = [
+        ["coverage", str(Fraction(bound.coverage * stage.order, bound.denominator))]
+    ]
+    for face, multiplier in zip(stage.row_faces.tolist(), bound.multipliers[:rows].tolist(), strict=True):
+        if multiplier:
+            multipliers.append([face, str(Fraction(multiplier, bound.denominator))])
+    cuts = [
+        {
+            "family": "link",
+            "simplices": cut.simplices.tolist(),
+            "coefficients": cut.coefficients.tolist(),
+            "rhs": 0,
+            "multiplier": str(Fraction(multiplier, bound.denominator) / cut.factor),
+            "proof": {"face": list(cut.face)},
+            "group": cut.level,
+        }
+        for cut, multiplier in zip(stage.cuts, bound.multipliers[rows:].tolist(), strict=True)
+        if multiplier
+    ]
+    return {"multipliers": multipliers, "cuts": cuts}

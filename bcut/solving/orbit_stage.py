@@ -62,6 +62,11 @@ class OrbitStage:
     rounds: tuple[Round, ...] = ()
     separating: float = 0.0
 
+    @property
+    def flag(self) -> NDArray[np.int64]:
+        """An affine basis: the vertices of any simplex."""
+        return self.formulation.simplices[0]
+
     def columns_within(self, target: Fraction) -> int:
         """Count the simplices that a triangulation with ``sign * objective <= target`` may use."""
         assert self.root.bound is not None

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from math import comb, floor
+from math import comb
 
 from bcut.errors import VerificationError
 from bcut.verification.certificate_data import CertificateData, CertifiedBound
@@ -78,7 +78,7 @@ def certified_bound(
     sides = Candidates(points, spanning=spanning, restrictions=restrictions)
     for flag in (certificate.flag, *(certificate.chambers or {})):
         check_flag(sides, flag)
-    _check_rows(sides, certificate)
+    check_rows(sides, certificate)
     obstacle = check_cuts(sides, certificate)
     if obstacle:
         return CertifiedBound(None, obstacle=obstacle)
@@ -92,23 +92,22 @@ def certified_bound(
     obstacle = _check_refutation(program, found.bound, certificate)
     if obstacle:
         return replace(found, obstacle=obstacle)
-    target = certificate.refutes.target
-    # Between integral values there is nothing: the next one is a bound.
-    beyond = Fraction(sign * (floor(sign * target) + 1)) if found.integral else target
-    return replace(found, bound=max(found.bound, beyond, key=lambda bound: sign * bound), refuted=target)
+    return found.beyond(certificate.refutes.target, sign)
 
 
 def _check_refutation(program: CertificateProgram, bound: Fraction, certificate: CertificateData) -> str:
     """Refuse stages that do not prove the target to be out of reach; return why they cannot be checked, or nothing."""
     refutes, sign, sides = certificate.refutes, program.sign, program.sides
     assert refutes is not None
+    if refutes.case is not None:
+        raise VerificationError("the certificate splits cases by symmetries, but has none")
     for number, stage in enumerate(refutes.stages):
         where = f"stage {number} of the certificate's refutation of {refutes.target}"
         left = program.left_within(sign * (refutes.target - bound))
         sides = sides.only(left)
         stage = replace(stage, flag=certificate.flag)
         try:
-            _check_rows(sides, stage)
+            check_rows(sides, stage)
             obstacle = check_cuts(sides, stage)
         except VerificationError as error:
             raise VerificationError(f"{where}: {error}") from None
@@ -149,7 +148,8 @@ def check_flag(sides: SideTable, flag: Simplex) -> None:
         )
 
 
-def _check_rows(sides: SideTable, certificate: CertificateData) -> None:
+def check_rows(sides: SideTable, certificate: CertificateData) -> None:
+    """Refuse multipliers of rows that there are not."""
     n, d = sides.points.n, sides.points.dimension
     for facet in certificate.cocircuits or {}:
         if len(facet) != d or not all(0 <= v < n for v in facet):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import floor
 
 from bcut.verification.cut_data import CertificateCut
 from bcut.verification.exact_points import Simplex
@@ -74,10 +75,51 @@ class RefutationData:
     stages : tuple of CertificateData
         Each speaks of the candidates whose reduced costs in the one before, first in the certificate itself, a
         triangulation within the target may have.
+    case : CaseData or None
+        In the place of stages, where there are symmetries: these candidates, and all symmetries.
     """
 
     target: Fraction
     stages: tuple[CertificateData, ...]
+    case: CaseData | None = None
+
+
+@dataclass(frozen=True)
+class StageData:
+    """A stage of a case; see `bcut.verification.case_split`.
+
+    Attributes
+    ----------
+    data : CertificateData
+        Its multipliers; that of the coverage row belongs to the mean of the row's images.
+    groups : tuple of int
+        For each cut, by how many chosen faces the group is told whose images of the cut are meant.
+    """
+
+    data: CertificateData
+    groups: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CaseData:
+    """A case of a proof.
+
+    Attributes
+    ----------
+    where : str
+        What to call it in messages.
+    stages : tuple of StageData
+    face : tuple of int
+        Ascending; empty where the stages are the proof.
+    chosen, excluded : CaseData or None
+        Of the triangulations with the face, and of those without any image of it.
+    """
+
+    where: str
+    stages: tuple[StageData, ...]
+    face: Simplex = ()
+    chosen: CaseData | None = None
+    excluded: CaseData | None = None
 
 
 @dataclass(frozen=True)
@@ -108,3 +150,10 @@ class CertifiedBound:
     def is_checked(self) -> bool:
         """Whether the bound was re-computed."""
         return self.bound is not None
+
+    def beyond(self, target: Fraction, sign: int) -> CertifiedBound:
+        """Return what holds where no triangulation reaches a target either."""
+        # Between integral values there is nothing: the next one is a bound.
+        beyond = Fraction(sign * (floor(sign * target) + 1)) if self.integral else target
+        bound = beyond if self.bound is None else max(self.bound, beyond, key=lambda value: sign * value)
+        return replace(self, bound=bound, refuted=target)

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from bcut.verification.certificate_data import CertificateData, RefutationData
+from bcut.verification.certificate_data import CaseData, CertificateData, RefutationData, StageData
 from bcut.verification.cut_data import CertificateCut
 from bcut.verification.entries import EntryReader
 from bcut.verification.exact_points import Simplex
+
+# Cases within cases that are read.
+MAX_DEPTH = 200
 
 
 class CertificateReader(EntryReader):
@@ -57,28 +60,53 @@ class CertificateReader(EntryReader):
             return None
         if not isinstance(value, Mapping):
             self.refuse(where, "this is a JSON object or null", value)
+        target = self.rational(self.entry(value, f"{where}.target"), f"{where}.target")
+        if "case" in value:
+            return RefutationData(target, (), self.case(value["case"], f"{where}.case", 0))
         listed = self.list_of(
             self.entry(value, f"{where}.stages"), f"{where}.stages", "this is a list of stages"
         )
-        stages = []
-        for index, stage in enumerate(listed):
-            place = f"{where}.stages[{index}]"
-            if not isinstance(stage, Mapping):
-                self.refuse(place, "this is a JSON object", stage)
-            coverage, cocircuits, _ = self.multipliers(
-                self.entry(stage, f"{place}.multipliers"), "coverage", f"{place}.multipliers"
-            )
-            cuts = self.list_of(stage.get("cuts", []), f"{place}.cuts", "this is a list of cuts")
-            stages.append(
-                CertificateData(
-                    bound=None,
-                    coverage=coverage,
-                    cocircuits=cocircuits,
-                    cuts=tuple(self.cut(cut, f"{place}.cuts[{k}]") for k, cut in enumerate(cuts)),
-                )
-            )
-        target = self.rational(self.entry(value, f"{where}.target"), f"{where}.target")
+        stages = (self.stage(stage, f"{where}.stages[{k}]")[0] for k, stage in enumerate(listed))
         return RefutationData(target, tuple(stages))
+
+    def stage(self, value: Any, where: str) -> tuple[CertificateData, list[Any]]:
+        """Read a stage, and return the entries of its cuts as well."""
+        if not isinstance(value, Mapping):
+            self.refuse(where, "this is a JSON object", value)
+        coverage, cocircuits, _ = self.multipliers(
+            self.entry(value, f"{where}.multipliers"), "coverage", f"{where}.multipliers"
+        )
+        listed = self.list_of(value.get("cuts", []), f"{where}.cuts", "this is a list of cuts")
+        cuts = tuple(self.cut(cut, f"{where}.cuts[{k}]") for k, cut in enumerate(listed))
+        return CertificateData(bound=None, coverage=coverage, cocircuits=cocircuits, cuts=cuts), listed
+
+    def case(self, value: Any, where: str, depth: int) -> CaseData:
+        """Read a case of a proof, and those that it is split into."""
+        if not isinstance(value, Mapping):
+            self.refuse(where, "this is a JSON object", value)
+        if depth > MAX_DEPTH:
+            self.refuse(where, f"cases are at most {MAX_DEPTH} within each other", "one more")
+        stages = []
+        listed = self.list_of(
+            self.entry(value, f"{where}.stages"), f"{where}.stages", "this is a list of stages"
+        )
+        for number, entry in enumerate(listed):
+            place = f"{where}.stages[{number}]"
+            data, cuts = self.stage(entry, place)
+            groups = (
+                self.integer(self.entry(cut, f"{place}.cuts[{k}].group"), f"{place}.cuts[{k}].group")
+                for k, cut in enumerate(cuts)
+            )
+            stages.append(StageData(data, tuple(groups)))
+        if "face" not in value:
+            return CaseData(where, tuple(stages))
+        return CaseData(
+            where,
+            tuple(stages),
+            self.ascending(value["face"], f"{where}.face"),
+            self.case(self.entry(value, f"{where}.chosen"), f"{where}.chosen", depth + 1),
+            self.case(self.entry(value, f"{where}.excluded"), f"{where}.excluded", depth + 1),
+        )
 
     def multipliers(
         self, value: Any, named: str, place: str

@@ -20,7 +20,7 @@ orbits of sets of d points, with their lengths, which `SetOrbits` lists.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import comb, lcm
 from typing import Any
@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from bcut.errors import VerificationError
 from bcut.geometry.numbers import AlgebraicNumber
+from bcut.verification.case_split import MAX_ELEMENTS, CaseChecker, Element, Frame, listed_elements
 from bcut.verification.certificate import check_claim, check_cuts, check_flag
 from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.costs import Costs, CostTable
@@ -93,10 +94,24 @@ def certified_orbit_bound(
         raise VerificationError(f"the orbits of sets of {d} points do not make up all of them")
     simplices = SetOrbits(symmetries, n, d + 1) if certificate.cuts else None
     sign = 1 if sense == "min" else -1
-    found = _OrbitProgram(sides, certificate, facets, simplices, costs, sign, spanning).solve()
+    program = _OrbitProgram(sides, certificate, facets, simplices, costs, sign, spanning)
+    found = program.solve()
     assert found.bound is not None
     check_claim(certificate, found.bound, sense)
-    return found
+    refutes = certificate.refutes
+    if refutes is None:
+        return found
+    if refutes.case is None:
+        raise VerificationError("the certificate has symmetries, but its refutation does not use them")
+    group = listed_elements(symmetries, n)
+    if group is None:
+        return replace(found, obstacle=f"it takes a list of more than {MAX_ELEMENTS:,} symmetries")
+    left = frozenset(program.left_within(sign * (refutes.target - found.bound), group))
+    checker = CaseChecker(sides, certificate.flag, costs, sign, spanning, refutes.target)
+    obstacle = checker.check(refutes.case, [Frame(group, left)])
+    if obstacle:
+        return replace(found, obstacle=obstacle)
+    return found.beyond(refutes.target, sign)
 
 
 def is_invariant(objective: str, table: CostTable | None, symmetries: Sequence[Simplex]) -> bool:
@@ -220,17 +235,33 @@ class _OrbitProgram:
         d = self.points.dimension
         loss: Fraction | int = 0
         count, integral = 0, True
+        for batch, _, reduced, is_integral in self._reduced_costs():
+            count += batch.length
+            loss += batch.length * reduced if reduced < 0 else 0
+            integral = integral and is_integral
+        bound = self.sign * (self.constant + Fraction(loss, d + 1)) / self.scale
+        return CertifiedBound(bound, integral or self.costs.integral, count // (d + 1))
+
+    def left_within(self, slack: Fraction, group: Sequence[Element]) -> set[Simplex]:
+        """Return all candidates whose reduced costs are at most so much."""
+        most = slack * self.scale
+        left: set[Simplex] = set()
+        for _, simplex, reduced, _ in self._reduced_costs():
+            if reduced <= most and simplex not in left:
+                left.update(element.of(simplex) for element in group)
+        return left
+
+    def _reduced_costs(self) -> Iterator[tuple[_Batch, Simplex, int | Fraction, bool]]:
+        """Yield the candidates of each batch with their reduced costs, times the scale, and whether costs are integral.
+
+        Each orbit of candidates comes up, as every simplex has facets.
+        """
         for batch in self._batches():
             if not batch.simplices:
                 continue
-            count += batch.length * len(batch.simplices)
             costs = self.costs.of(batch.simplices)
-            for cost, activity in zip(costs, self._activities(batch), strict=True):
-                reduced = self.sign * self.scale * cost - activity
-                loss += batch.length * reduced if reduced < 0 else 0
-                integral = integral and cost.denominator == 1
-        bound = self.sign * (self.constant + Fraction(loss, d + 1)) / self.scale
-        return CertifiedBound(bound, integral or self.costs.integral, count // (d + 1))
+            for simplex, cost, activity in zip(batch.simplices, costs, self._activities(batch), strict=True):
+                yield batch, simplex, self.sign * self.scale * cost - activity, cost.denominator == 1
 
     def _batches(self) -> Iterator[_Batch]:
         """Yield the candidates over each representative of the orbits of (d-1)-simplices."""
