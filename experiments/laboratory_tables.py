@@ -66,7 +66,7 @@ def foot(experiment: Experiment) -> str:
     seconds = ", ".join(f"{limit:g}" for limit in sorted(limits))
     return (
         f"{len(experiment.runs)} runs of {plan}{missing}{failed}; {versions}; a shared {where}; "
-        f"limit {seconds} s a run; seconds are processor time, means of them geometric and shifted."
+        f"limit {seconds} s a run; seconds are processor time unless called wall time, means of them geometric and shifted."
     )
 
 
@@ -85,11 +85,11 @@ def roots(experiment: Experiment) -> str:
                 share(mean(closed)),
                 f"{sum(value >= 1 - 1e-6 for value in closed)} of {len(closed)}",
                 f"{sum(bool(run.outcome['integral']) for run in runs)}",
-                number(shifted_geometric_mean([run.processor_seconds for run in runs], SECONDS)),
+                number(shifted_geometric_mean([run.seconds for run in runs], SECONDS)),
                 f"{len(stopped)}",
             )
         )
-    head = ("variant", "gap closed, mean", "entirely", "integral", "seconds", "at the limit")
+    head = ("variant", "gap closed, mean", "entirely", "integral", "wall seconds", "at the limit")
     return table(head, rows)
 
 

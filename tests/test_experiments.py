@@ -408,6 +408,7 @@ def test_a_record_says_what_was_asked_and_what_came_out(tmp_path: Path) -> None:
     assert outcome["separators"]["link"]["added"] == record["cuts"]["link"]["taken"] > 0
     assert record["cuts"]["link"]["active"] > 0
     assert outcome["seconds"]["total"] >= outcome["seconds"]["lp"] + outcome["seconds"]["separation"] > 0
+    assert outcome["seconds"]["processor"] > 0
     assert record["instance"]["points"] == 12
     json.dumps(record)
 

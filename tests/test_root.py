@@ -252,6 +252,16 @@ def test_columns_without_a_triangulation_are_infeasible() -> None:
         assert found.lp is None
 
 
+def test_cuts_that_contradict_each_other_refute_a_target_without_a_proof() -> None:
+    # Not even the point 0 satisfies them, so that there is no greatest coverage to make a proof of.
+    formulation = cocircuit_formulation(load_instance("cube:3"))
+    cuts = [cut_of([0, 1], [-1, -1], -1), cut_of([0, 1], [1, 1], 0)]
+    objective = make_objective("cardinality", formulation)
+    found = root_bound(formulation, objective, limits=RootLimits(target=Fraction(4)), cuts=cuts)
+    assert found.status == "infeasible"
+    assert found.stages == []
+
+
 @pytest.mark.parametrize("interior_point_from", [1, 10**9])
 def test_both_algorithms_agree(monkeypatch: pytest.MonkeyPatch, interior_point_from: int) -> None:
     monkeypatch.setattr(relaxation_module, "_INTERIOR_POINT_FROM", interior_point_from)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.bounds.relaxation import Relaxation
+from bcut.bounds.relaxation import InfeasibleRelaxationError, Relaxation
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.formulation import Formulation
 from bcut.objectives.objective import from_fractions
@@ -53,12 +53,17 @@ def bound_beyond(relaxation: Relaxation, target: Fraction) -> SafeBound | None:
     Returns
     -------
     SafeBound or None
-        For the rows and cuts of the relaxation. None where floating point does not do.
+        For the rows and cuts of the relaxation. None where floating point does not do, or where cuts rule out that
+        nothing is covered.
     """
     formulation, objective = relaxation.formulation, relaxation.objective
     if formulation.row_name(0) != "coverage" or formulation.lazy:
         return None
-    rest, duals = _coverage_at_most(formulation, relaxation.cuts)
+    try:
+        rest, duals = _coverage_at_most(formulation, relaxation.cuts)
+    except InfeasibleRelaxationError:
+        # Cuts that ask for simplices, such as parity cuts, contradict each other even where nothing is covered.
+        return None
     missing = 1 + float(rest.safe_bound(duals).value)
     if missing <= 0:
         return None

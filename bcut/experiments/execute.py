@@ -315,10 +315,14 @@ class _Run:
         """Seconds that recording took, which are no part of the time of the run."""
         return 0.0 if self.recorder is None else self.recorder.seconds
 
-    def _seconds(self, *, lp: float, own: Mapping[str, Any], aside: float = 0.0) -> dict[str, float]:
+    def _seconds(
+        self, *, lp: float, own: Mapping[str, Any], aside: tuple[float, float] = (0.0, 0.0)
+    ) -> dict[str, float]:
+        # Recording is no part of the run, nor is what was set aside, as wall and as processor time.
+        recording = 0.0 if self.recorder is None else self.recorder.processor
         return {
-            "total": time.perf_counter() - self.started - self._recording - aside,
-            "processor": time.process_time() - self.processor - self._recording - aside,
+            "total": time.perf_counter() - self.started - self._recording - aside[0],
+            "processor": time.process_time() - self.processor - recording - aside[1],
             "lp": max(0.0, lp),
             "separation": sum(entry["seconds"] for entry in own.values()),
         }
@@ -337,7 +341,11 @@ class _Run:
             **self._size(formulation),
             "columns_after_fixing": None,
             "separators": {**own, **theirs},
-            "seconds": self._seconds(lp=tree.solver.lp_seconds, own={**own, **theirs}, aside=tree.watching),
+            "seconds": self._seconds(
+                lp=tree.solver.lp_seconds,
+                own={**own, **theirs},
+                aside=(tree.watching, tree.watching_processor),
+            ),
         }
 
     def _of_result(self, result: Any) -> dict[str, Any]:

@@ -72,14 +72,14 @@ class Recorder:
     Attributes
     ----------
     counts : dict of str to CutCounts
-    seconds : float
-        What recording took while separators were at work: no part of the time of a run.
+    seconds, processor : float
+        What recording took while separators were at work, as wall and as processor time: no part of that of a run.
     """
 
     def __init__(self, writer: LedgerWriter, whole: Formulation | None = None) -> None:
         self.writer, self.whole = writer, whole
         self.counts: dict[str, CutCounts] = {}
-        self.seconds = 0.0
+        self.seconds, self.processor = 0.0, 0.0
         self._node, self._round, self._value = -1, 0, 0.0
         self._stirred = True
         self._open: list[_Open] = []
@@ -128,7 +128,7 @@ class Recorder:
 
     def root_lp(self, lp: RootLp) -> None:
         """Note a relaxation of SCIP's root, and the rows that SCIP's own separators added to it."""
-        before, seconds = self._last_lp, self.seconds
+        before, spent = self._last_lp, (self.seconds, self.processor)
         if before is None or not np.array_equal(before.x, lp.x):
             self._stirred = True
         self.relaxed(lp.value, _SCIP_ROOT)
@@ -138,7 +138,7 @@ class Recorder:
                 self._known_rows[key] = self._write_row(row, before, lp.value)
         self._last_lp = lp
         # The host knows what this took.
-        self.seconds = seconds
+        self.seconds, self.processor = spent
 
     # The end.
 
@@ -217,11 +217,12 @@ class Recorder:
 
     @contextmanager
     def _timed(self) -> Iterator[None]:
-        started = time.perf_counter()
+        started, processor = time.perf_counter(), time.process_time()
         try:
             yield
         finally:
             self.seconds += time.perf_counter() - started
+            self.processor += time.process_time() - processor
 
     # Entries.
 

@@ -65,7 +65,7 @@ class RootRecord:
         self, objective: Objective, watch: RootLpWatcher | None = None, families: set[str] | None = None
     ) -> None:
         self.watch, self.families = watch, families or set()
-        self.watching = 0.0
+        self.watching, self.watching_processor = 0.0, 0.0
         self.costs = objective.costs
         self.tolerance = 1e-9 * objective.largest_cost
         self.rounds: list[Round] = []
@@ -90,11 +90,12 @@ class RootRecord:
     def show(self, model: Any, values: LpValues, x: NDArray[np.float64]) -> None:
         """Show a relaxation of the root to whoever watches, before anything is added to it."""
         if self.watch is not None:
-            started = time.perf_counter()
+            started, processor = time.perf_counter(), time.process_time()
             self.watch(read_root_lp(model, values.transformed, x, float(self.costs @ x), self.families))
             # The time that watching takes is no round's.
             spent = time.perf_counter() - started
             self.watching += spent
+            self.watching_processor += time.process_time() - processor
             self._started += spent
 
 
