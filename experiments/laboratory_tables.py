@@ -66,7 +66,8 @@ def foot(experiment: Experiment) -> str:
     seconds = ", ".join(f"{limit:g}" for limit in sorted(limits))
     return (
         f"{len(experiment.runs)} runs of {plan}{missing}{failed}; {versions}; a shared {where}; "
-        f"limit {seconds} s a run; seconds are processor time unless called wall time, means of them geometric and shifted."
+        f"limit {seconds} s a run; seconds are processor time unless called wall time, and means of them geometric, "
+        "shifted by one."
     )
 
 
