@@ -10,9 +10,12 @@ an odd number if the coverage row is among the rows. That forbids all choices of
 For a given N the most violated F is the set of those with values above 1/2, or differs from it by the one simplex whose
 exchange costs least. The left side falls short of |F| by the sum of min(x, 1 - x), so what is wanted are checks with
 little fractional support. They come from Gaussian elimination over GF(2), with the columns ordered by how fractional
-they are: then every check has one very fractional simplex and few others (as for linear codes: M. H. Taghavi and P. H.
-Siegel, "Adaptive methods for linear programming decoding", 2008). These are {0, 1/2}-cuts (A. Caprara and M. Fischetti,
-1996) on the rows of the formulation, complete ones, with no rounding of coefficients.
+they are (as for linear codes: M. H. Taghavi and P. H. Siegel, "Adaptive methods for linear programming decoding",
+2008). Two kinds of checks are left in the end. A pivot row has one very fractional simplex and few others. A row
+without a pivot has no fractional simplex at all, and if its parity is wrong, its cut is violated by 1. At points in
+halves only the second kind cuts anything off, because every check has an even number of fractional simplices there:
+docs/parity-cuts.md has the proof. These are {0, 1/2}-cuts (A. Caprara and M. Fischetti, 1996) on the rows of the
+formulation, complete ones, with no rounding of coefficients.
 """
 
 from __future__ import annotations
@@ -43,6 +46,7 @@ class Parity(Separator):
     """
 
     name: ClassVar[str] = "parity"
+    stage: ClassVar[int] = 1
 
     def __init__(self, *, max_cuts: int = 40, max_columns: int = 2000, max_support: int = 4000) -> None:
         if min(max_cuts, max_columns, max_support) < 1:
@@ -63,7 +67,7 @@ class Parity(Separator):
         self.columns = self.rows.tocsc()
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
-        """Yield the most violated check of every row of the eliminated system, most violated first."""
+        """Yield the most violated cut of every row of the eliminated system, most violated first."""
         if not self.faces or not len(point.fractional):
             return
         x = point.x
@@ -78,7 +82,7 @@ class Parity(Separator):
             yield kept
 
     def _combinations(self, columns: NDArray[np.integer]) -> Iterator[NDArray[np.intp]]:
-        """Yield sets of rows whose sums have few of the columns: one for each column that can be a pivot."""
+        """Yield sets of rows whose sums have few of the columns, or none."""
         part = self.columns[:, columns]
         rows = np.unique(part.indices)
         table = np.zeros((len(rows), len(columns)), dtype=bool)
@@ -88,7 +92,6 @@ class Parity(Separator):
         packed = _packed(table), _packed(np.eye(len(rows), dtype=bool))
         work = np.concatenate(packed, axis=1)
         free = np.ones(len(rows), dtype=bool)
-        pivots = []
         for column in range(len(columns)):
             word, bit = divmod(column, 64)
             has = (work[:, word] >> np.uint64(bit)) & np.uint64(1) == 1
@@ -98,10 +101,9 @@ class Parity(Separator):
                 has[pivot] = False
                 work[has] ^= work[pivot]
                 free[pivot] = False
-                pivots.append(pivot)
         width = packed[0].shape[1]
-        for pivot in pivots:
-            members = np.unpackbits(work[pivot, width:].view(np.uint8), bitorder="little", count=len(rows))
+        for row in work[:, width:]:
+            members = np.unpackbits(row.view(np.uint8), bitorder="little", count=len(rows))
             yield rows[np.flatnonzero(members)]
 
     def _cut(self, combination: NDArray[np.intp], x: NDArray[np.floating]) -> tuple[float, Cut] | None:

@@ -12,11 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 import bcut
-from bcut.bounds.root import root_bound
+from bcut.bounds.root import RootLimits, root_bound
 from bcut.errors import VerificationError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.geometry.numbers import parse_coordinate
 from bcut.objectives.objective import make_objective
+from bcut.separation.driver import Separation
 from bcut.separation.seam import Cut, FractionalPoint, Problem
 from bcut.separators.parity import Parity
 from bcut.verification.cut_data import Candidates, CertificateCut
@@ -73,17 +74,46 @@ def test_every_cut_is_violated_and_proven_by_its_rows() -> None:
         assert check_parity(candidates, certified(problem, cut)) == cut.rhs
 
 
-def test_parity_says_nothing_about_some_points_with_halves() -> None:
-    # The columns of these optima are dependent modulo 2, so no sum of rows has a single half.
-    for name in ("random:12,3,seed=1000", "random:16,3,seed=1002"):
-        problem = problem_of(name, spanning=True)
-        root = root_bound(
-            problem.formulation, make_objective("cardinality", problem.formulation, sense="min")
-        )
-        assert root.point is not None
-        cuts, point = cuts_at(problem, root.point)
-        assert np.allclose(point.x[point.fractional], 0.5)
-        assert not cuts
+@pytest.mark.parametrize(("name", "whole"), [("random:12,3,seed=1000", 17), ("random:16,3,seed=1002", None)])
+def test_points_with_halves_violate_checks_without_fractional_simplices(name: str, whole: int | None) -> None:
+    problem = problem_of(name, spanning=True)
+    root = root_bound(problem.formulation, make_objective("cardinality", problem.formulation, sense="min"))
+    assert root.point is not None
+    cuts, point = cuts_at(problem, root.point)
+    assert np.allclose(point.x[point.fractional], 0.5)
+    candidates = candidates_of(problem)
+    assert cuts
+    for cut in cuts:
+        # Every check has an even number of halves; from two on, no choice is forbidden that a half of each comes near.
+        assert not np.isin(cut.simplices, point.fractional).any()
+        assert point.value(cut) == pytest.approx(cut.rhs + 1)
+        assert check_parity(candidates, certified(problem, cut)) == cut.rhs
+    if whole is not None:
+        result = bcut.bound(name, spanning=True, separators=["parity"])
+        assert result.root.lp_after_cuts == pytest.approx(whole)
+
+
+def test_the_system_is_eliminated() -> None:
+    problem, _, point = thirds()
+    separator = Parity()
+    separator.setup(problem)
+    columns = point.fractional
+    rows = [np.unique(separator.rows[row].indices) for row in range(len(separator.faces))]
+    pivots = []
+    seen = set()
+    for combination in separator._combinations(columns):
+        odd: set[int] = set()
+        for row in combination:
+            odd ^= set(rows[row].tolist())
+        assert len(combination)
+        seen.add(tuple(combination.tolist()))
+        pivots.append(len(odd & set(columns.tolist())))
+    # Nothing is lost: as many sums as rows with a fractional simplex, all different.
+    assert len(seen) == len(pivots) == sum(bool(np.isin(row, columns).any()) for row in rows)
+    rank = len(pivots) - pivots.count(0)
+    assert rank <= len(columns)
+    # A pivot row has one column of its own and those that are dependent on others.
+    assert max(pivots) <= 1 + len(columns) - rank
 
 
 def test_the_coverage_row_is_an_odd_check() -> None:
@@ -98,10 +128,26 @@ def test_the_coverage_row_is_an_odd_check() -> None:
 
 
 def test_the_bound_of_random_points_moves() -> None:
-    result = bcut.bound("random:20,3,seed=1001", spanning=True, separators=["parity"])
-    assert result.root.lp == pytest.approx(34 + 1 / 3)
-    assert result.root.lp_after_cuts is not None
-    assert result.root.lp_after_cuts >= 34.4
+    problem = problem_of("random:20,3,seed=1001", spanning=True)
+    result = root_bound(
+        problem.formulation,
+        make_objective("cardinality", problem.formulation, sense="min"),
+        Separation([Parity()], problem),
+        limits=RootLimits(rounds=5),
+    )
+    assert result.lp == pytest.approx(34 + 1 / 3)
+    assert result.lp_after_cuts is not None
+    # Sums with a pivot alone run dry at 34.5.
+    assert 34.55 <= result.lp_after_cuts <= 35
+
+
+@pytest.mark.parametrize(("seed", "link", "optimum"), [(1, 89.5, 89), (20, 100.5, 100), (49, 91.5, 91)])
+def test_maxima_that_link_cuts_leave_are_closed(seed: int, link: float, optimum: int) -> None:
+    bounds = [
+        bcut.bound(f"random:20,3,seed={seed}", sense="max", separators=names).root.lp_after_cuts
+        for names in (["link"], ["link", "parity"])
+    ]
+    assert bounds == [pytest.approx(link), pytest.approx(optimum)]
 
 
 def test_formulations_without_cocircuit_rows_have_no_parity() -> None:
@@ -134,6 +180,8 @@ def test_formulations_without_cocircuit_rows_have_no_parity() -> None:
             lambda cut: replace(cut, proof={**cut.proof, "rows": [[0, 1, 2]]}),
             "no points strictly on both sides",
         ),
+        (lambda cut: replace(cut, proof={**cut.proof, "flag": 3}), "has no good 'flag'"),
+        (lambda cut: replace(cut, proof={**cut.proof, "flag": [0, 1, 2, "3"]}), "has no good 'flag'"),
     ],
 )
 def test_the_checker_refuses_what_does_not_follow(change: Change, reason: str) -> None:
