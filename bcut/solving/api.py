@@ -72,9 +72,10 @@ def solve(
         Of the solver's random choices.
     method : {"auto", "listing", "orbits", "fixing", "elimination", "scip"}
         "listing" lists all simplices, bounds and fixes at the root, and lets SCIP branch on what is left; "orbits"
-        does so with orbits of simplices under the symmetries, for cardinality only; "fixing" bounds by a first-order
-        method, so that only some per cent of the simplices are ever in a solver; "elimination", for least weight in the
-        plane with all points used, takes edges away by theorems, without a certificate; "scip" hands SCIP everything.
+        does so with orbits of simplices under the symmetries that keep the costs, for cardinality and costs in a file
+        only; "fixing" bounds by a first-order method, so that only some per cent of the simplices are ever in a solver;
+        "elimination", for least weight in the plane with all points used, takes edges away by theorems, without a
+        certificate; "scip" hands SCIP everything.
         "auto" takes orbits for large symmetric configurations, elimination or fixing for other large ones, and listing
         otherwise.
     symmetries : path, or sequence of permutations, optional

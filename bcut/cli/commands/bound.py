@@ -26,9 +26,10 @@ from bcut.cli.running import carry_out
     type=click.Choice(["auto", "listing", "orbits", "fixing"]),
     default="auto",
     show_default=True,
-    help="listing: all simplices. orbits: orbits of simplices under the symmetries (cardinality only; of the "
-    "separators only link is at work). fixing: a first-order method for all simplices, cuts for the few that matter. "
-    "auto: orbits for large symmetric configurations, fixing for other large ones, else listing.",
+    help="listing: all simplices. orbits: orbits of simplices under the symmetries that keep the costs "
+    "(cardinality and costs:FILE only; of the separators only link is at work). fixing: a first-order method for "
+    "all simplices, cuts for the few that matter. auto: orbits for large symmetric configurations, fixing for "
+    "other large ones, else listing.",
 )
 @symmetry_options
 @run_options

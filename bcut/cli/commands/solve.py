@@ -34,10 +34,11 @@ from bcut.cli.running import carry_out
     default="auto",
     show_default=True,
     help="listing: list all simplices, bound and fix at the root, then branch on what is left. orbits: the same "
-    "with orbits of simplices under the symmetries (cardinality only). fixing: bound by a first-order method; "
-    "solvers see the few simplices that the bound leaves. elimination: take edges away by theorems "
-    "(--objective weight --spanning in the plane only). scip: leave everything to SCIP. auto: orbits for "
-    "large symmetric configurations, elimination or fixing for other large ones, else listing.",
+    "with orbits of simplices under the symmetries that keep the costs (cardinality and costs:FILE only). "
+    "fixing: bound by a first-order method; solvers see the few simplices that the bound leaves. elimination: "
+    "take edges away by theorems (--objective weight --spanning in the plane only). scip: leave everything to "
+    "SCIP. auto: orbits for large symmetric configurations, elimination or fixing for other large ones, else "
+    "listing.",
 )
 @symmetry_options
 @click.option(
