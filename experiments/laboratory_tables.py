@@ -2,7 +2,7 @@
 
     python experiments/laboratory_tables.py results
 
-Looks into the folders ``ablation-root``, ``strategy``, ``hard``, ``hard-root``, ``symmetric-root`` and
+Looks into the folders ``ablation-root``, ``parity``, ``strategy``, ``hard``, ``hard-root``, ``symmetric-root`` and
 ``min-cardinality`` of the one given, which are the results of the plans of these names, and puts a table for each that
 is there between the lines ``<!-- NAME -->`` and ``<!-- end of NAME -->`` of the pages in ``docs/``. Where no page has
 such lines it prints the table.
@@ -188,6 +188,7 @@ def totals(experiment: Experiment) -> str:
 TABLES: dict[str, tuple[str, Sequence[Callable[[Experiment], str]]]] = {
     "ablation": ("ablation-root", (roots, foot)),
     "ablation by class": ("ablation-root", (classes,)),
+    "parity": ("parity", (roots, foot)),
     "strategy": ("strategy", (solves, foot)),
     "hard": ("hard", (totals, foot)),
     "hard instances": ("hard", (instances,)),
