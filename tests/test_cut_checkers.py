@@ -112,6 +112,14 @@ def test_a_face_of_the_boundary_has_no_link_cuts() -> None:
     assert interior_faces(SMALL["a point inside"]) == [(5,)]
 
 
+def test_three_points_on_a_line_have_no_link_cuts() -> None:
+    sides = Candidates(ExactPoints(load_instance("grid:3,2,2,2").scalars()))
+    tetrahedra = [s for s in combinations(range(24), 4) if any(sides[s])]
+    (line, *_) = [f for f in combinations(range(24), 3) if not any(set(f) <= set(s) for s in tetrahedra)]
+    with pytest.raises(VerificationError, match="affinely dependent"):
+        CUT_CHECKERS["link"](sides, cut("link", {}, 0, {"face": list(line)}))
+
+
 @pytest.mark.parametrize("face", [None, [0, 1], [99], "x", [0.5]])
 def test_a_link_cut_needs_its_face(face: Any) -> None:
     with pytest.raises(VerificationError, match="face"):

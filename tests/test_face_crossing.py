@@ -444,6 +444,20 @@ def test_flags_decide_which_simplices_count_for_a_face() -> None:
         check_face_crossing(candidates, two)
 
 
+def test_simplices_with_three_points_on_a_line_count_for_no_face() -> None:
+    problem = problem_of("grid:3,2,2")
+    candidates = candidates_of(problem)
+    flat = [s for s in combinations(range(12), 4) if not candidates.orientation(s)]
+    assert any(not any(candidates[facet]) for simplex in flat for facet in combinations(simplex, 3))
+    for simplex in flat:
+        for vertex in simplex:
+            rest = next(s for s in problem.simplices.tolist() if vertex in s)
+            faces = [[[vertex], [v for v in rest if v != vertex], 1]]
+            cut = CertificateCut("face-crossing", (simplex,), (Fraction(1),), Fraction(1), Fraction(-1), {})
+            with pytest.raises(VerificationError, match="contains none of its faces"):
+                check_face_crossing(candidates, replace(cut, proof={"bound": 1, "faces": faces}))
+
+
 def test_coefficients_divided_by_a_common_factor_still_follow() -> None:
     cut = lifted_cut()
     candidates = candidates_of(halves()[0])

@@ -204,6 +204,26 @@ def test_costs_that_a_symmetry_changes_prove_nothing() -> None:
     assert "not known to be invariant" in bcut.verify(data).statement
 
 
+def test_costs_of_points_that_there_are_not_prove_nothing() -> None:
+    data = result_of("cube:3")
+    data["problem"]["objective"] = "costs:mine.json"
+    data["problem"]["costs"] = {"default": "1", "costs": [[[0, 1, 2, 99], "3"]]}
+    assert "not known to be invariant" in bcut.verify(data).statement
+
+
+@pytest.mark.parametrize("objective", ["random-costs:7", "weight", "volume"])
+def test_a_table_that_the_objective_does_not_use_makes_nothing_invariant(objective: str) -> None:
+    """The bound over orbits would be one on the costs of a few simplices, and more than a triangulation has."""
+    data = bcut.solve("cube:3", objective=objective, method="listing").to_dict()
+    data["problem"]["costs"] = {"default": "1", "costs": []}
+    claim = Fraction(21, 20) * Fraction(data["value"])
+    orbits = result_of("cube:3")["certificate"]
+    data["certificate"] = {**orbits, "bound": "-1000", "cuts": [], "multipliers": [["volume", str(claim)]]}
+    verification = bcut.verify(data)
+    assert "not known to be invariant" in verification.statement
+    assert not verification.proven_optimal
+
+
 @pytest.mark.parametrize("name", ["cube:3", "dodecahedron", "simplex-product:2,1,1", "prism:5"])
 def test_orbits_of_sets_agree_with_the_geometry_of_the_model(name: str) -> None:
     configuration = bcut.load_instance(name)

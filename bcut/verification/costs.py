@@ -71,7 +71,7 @@ def costs_of_objective(objective: str, table: CostTable | None, configuration: P
     """
     if objective == "cardinality":
         return Costs(lambda simplices: [1] * len(simplices), integral=True)
-    if objective.partition(":")[0] == "costs" or MeasureName.parse(objective).is_file:
+    if has_table(objective):
         if table is None:
             raise ResultError(
                 f"problem.costs is missing, so the values of objective '{objective}' cannot be re-computed; "
@@ -80,6 +80,11 @@ def costs_of_objective(objective: str, table: CostTable | None, configuration: P
         listed = (*table.costs.values(), *([] if table.default is None else [table.default]))
         return Costs(_looked_up(table), integral=all(cost.denominator == 1 for cost in listed))
     return Costs(_registered_measure(objective, configuration), integral=False)
+
+
+def has_table(objective: str) -> bool:
+    """Tell whether the costs of an objective are those of the table in the result file, whatever else is there."""
+    return objective.partition(":")[0] == "costs" or MeasureName.parse(objective).is_file
 
 
 def _registered_measure(

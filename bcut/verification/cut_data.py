@@ -182,6 +182,8 @@ def covers(sides: SideTable, simplex: Simplex, flag: Simplex) -> bool:
     """Tell whether a simplex contains the generic point of a flag, on each hyperplane the side of its first vertex."""
     for position, vertex in enumerate(simplex):
         plus, minus = sides[without(simplex, position)]
+        if not (plus | minus) >> vertex & 1:
+            return False  # it is flat, and perhaps this face of it spans no hyperplane
         own = plus if plus >> vertex & 1 else minus
         first = next(v for v in flag if (plus | minus) >> v & 1)
         if not own >> first & 1:

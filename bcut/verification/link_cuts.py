@@ -81,6 +81,10 @@ class _Circle:
     @classmethod
     def around(cls, sides: Candidates, face: Simplex) -> _Circle:
         others = [p for p in range(sides.points.n) if p not in face and any(sides[tuple(sorted((*face, p)))])]
+        if not others:
+            raise VerificationError(
+                f"link cut: the points {list(face)} are affinely dependent, so they are no face"
+            )
         circle = cls(face, {}, sides)
         for point in others:
             turns = {circle.turn(point, other) for other in others}

@@ -33,7 +33,7 @@ from bcut.geometry.numbers import AlgebraicNumber
 from bcut.verification.case_split import MAX_ELEMENTS, CaseChecker, Element, Frame, listed_elements
 from bcut.verification.certificate import check_claim, check_cuts, check_flag
 from bcut.verification.certificate_data import CertificateData, CertifiedBound
-from bcut.verification.costs import Costs, CostTable
+from bcut.verification.costs import Costs, CostTable, has_table
 from bcut.verification.cuts import Candidates
 from bcut.verification.exact_points import ExactPoints, SideTable, Simplex, mask_of, without
 from bcut.verification.hull import hull_volume
@@ -118,10 +118,11 @@ def is_invariant(objective: str, table: CostTable | None, symmetries: Sequence[S
     """Tell whether an objective is known to give all images of a simplex under some permutations the same cost."""
     if objective == "cardinality":
         return True
-    if table is None:
-        return False
+    if table is None or not has_table(objective):
+        return False  # a table may stand in the file, and yet have nothing to do with the costs
     return all(
-        table.costs.get(tuple(sorted(permutation[v] for v in simplex)), table.default) == cost
+        all(0 <= v < len(permutation) for v in simplex)
+        and table.costs.get(tuple(sorted(permutation[v] for v in simplex)), table.default) == cost
         for permutation in symmetries
         for simplex, cost in table.costs.items()
     )

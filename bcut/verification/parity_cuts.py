@@ -61,16 +61,18 @@ def _odd_candidates(candidates: Candidates, cut: CertificateCut) -> tuple[set[Si
             for point in range(n)
             if (plus | minus) >> point & 1 and (simplex := tuple(sorted((*row, point)))) in candidates
         }
-    if cut.proof.get("flag") is None:
+    order = cut.proof.get("flag")
+    if order is None:
         return odd, 0
-    flag = _sets([sorted(cut.proof["flag"])], n, d + 1, "flag")[0]
+    if not isinstance(order, list) or not all(type(v) is int for v in order):
+        raise VerificationError("parity cut: its proof has no good 'flag'")
+    flag = _sets([sorted(order)], n, d + 1, "flag")[0]
     if not candidates.orientation(flag):
         raise VerificationError(f"parity cut: its flag {list(flag)} lies in a hyperplane")
-    order = tuple(cut.proof["flag"])
     covering = {
         simplex
         for simplex in combinations(range(n), d + 1)
-        if simplex in candidates and covers(candidates, simplex, order)
+        if simplex in candidates and covers(candidates, simplex, tuple(order))
     }
     return odd ^ covering, 1
 
