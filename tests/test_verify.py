@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bcut
 from bcut.errors import BcutError, ResultError, VerificationError
 from bcut.geometry.configuration import PointConfiguration
+from bcut.verification import verify as verify_module
+from bcut.verification.certificate_data import CertifiedBound
 from bcut.verification.verify import verify
 
 CUBE = [[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)]
@@ -312,3 +315,14 @@ def test_random_damage_never_escapes_as_another_error() -> None:
             continue
         # What passes says the same as before; a name or an unused entry may have changed.
         assert verification.value == 5
+
+
+def test_a_bound_beyond_a_verified_triangulation_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = bcut.solve("cube:3")
+    monkeypatch.setattr(
+        verify_module, "certify", lambda *args, **options: CertifiedBound(Fraction(11, 2), integral=True)
+    )
+    with pytest.raises(
+        VerificationError, match=r"proves the bound 6, but its triangulation has the better value 5"
+    ):
+        verify(result)

@@ -12,10 +12,8 @@ from bcut.geometry.numbers import parse_coordinate
 from bcut.verification.certificate import MAX_SUBSETS, certified_bound
 from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.consistency import (
-    RELATIVE_GAP,
     check_consistency,
     is_better,
-    relative_gap,
     rounded,
     shown,
 )
@@ -26,6 +24,7 @@ from bcut.verification.goals import Certifier, Goal, Settled, certify
 from bcut.verification.orbit_certificate import MAX_TABLE, certified_orbit_bound, is_invariant
 from bcut.verification.reading import ResultData, Source, load_result
 from bcut.verification.region import verified_region
+from bcut.verification.statements import statement
 from bcut.verification.triangulation import check_triangulation
 
 
@@ -163,8 +162,14 @@ class _Verifier:
         self.checks.append(f"status '{data.status}', value, bound and gap do not contradict each other")
         exact = None if certified is None else certified.bound
         best = None if exact is None else rounded(exact, data.sense, integral)
+        if value is not None and best is not None and is_better(value, best, data.sense):
+            # Both have been proven, so something is wrong with the proofs, and neither is to be relied on.
+            raise VerificationError(
+                f"its certificate proves the bound {shown(best)}, but its triangulation has the better value "
+                f"{shown(value)}: one of the two checks is wrong, which is a defect of bcut; please report it"
+            )
         return GoalVerification(
-            statement=self._statement(data, value, best, certified),
+            statement=statement(data, value, best, certified),
             value=value,
             exact_bound=exact,
             rounded_bound=best,
@@ -378,48 +383,3 @@ class _Verifier:
             )
 
         return certifier
-
-    def _statement(
-        self,
-        data: ResultData,
-        value: Fraction | None,
-        best: Fraction | None,
-        certified: CertifiedBound | None,
-    ) -> str:
-        noun = "dissection" if data.dissection else "triangulation"
-        if data.status == "infeasible":
-            return "infeasible according to the solver: its proof is not in this file"
-        if value is None:
-            parts = [f"there is no {noun} in this result (status '{data.status}')"]
-        elif best is not None and not is_better(best, value, data.sense):
-            return (
-                f"optimal, proven exactly: the {noun} is verified, "
-                f"and its value {shown(value)} meets the bound {shown(best)}"
-            )
-        else:
-            parts = [f"{noun} verified, value {shown(value)}"]
-        parts.append(self._bound_statement(data, best, certified))
-        if value is None or data.status != "optimal":
-            if value is not None:
-                parts.append(f"not claimed to be optimal (status '{data.status}')")
-            if data.bound is not None and (best is None or is_better(best, data.bound.exact, data.sense)):
-                parts.append(f"the bound {shown(data.bound.exact)} rests on the solver's tree")
-        elif best is not None and relative_gap(value, best) <= RELATIVE_GAP:
-            parts.append(
-                f"so the value is optimal up to a relative gap of {float(relative_gap(value, best)):.1e}"
-            )
-        else:
-            # With a bound, what is left is the search between it and the value.
-            rest = "run itself" if best is None else "solver's tree"
-            parts.append(f"optimality rests on the {rest}")
-        return "; ".join(parts)
-
-    def _bound_statement(
-        self, data: ResultData, best: Fraction | None, certified: CertifiedBound | None
-    ) -> str:
-        if best is not None:
-            return f"bound {shown(best)} proven exactly"
-        if certified is not None:
-            return f"the bound of its certificate was not re-checked: {certified.obstacle}"
-        reason = data.certificate.reason if data.certificate is not None else ""
-        return "no exact bound in this file" + (f" ({reason})" if reason else "")
