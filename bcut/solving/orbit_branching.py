@@ -27,7 +27,7 @@ from bcut.bounds.averaged_root import AveragedRoot, AveragedStage, averaged_root
 from bcut.formulations.invariant import set_orbits
 from bcut.geometry.crossings import crossing_matrix
 from bcut.geometry.subsets import all_subsets
-from bcut.verification.certificate_reading import MAX_DEPTH
+from bcut.verification.certificate_data import MAX_DEPTH
 
 # Faces whose two parts are bounded before one is chosen: fewer where that takes longer, by the number of orbits.
 _TRIED = ((400, 40), (1200, 12), (10**9, 6))

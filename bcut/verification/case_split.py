@@ -30,7 +30,7 @@ from bcut.verification.certificate_data import CaseData, CertificateData, StageD
 from bcut.verification.certificate_program import CertificateProgram
 from bcut.verification.costs import Costs
 from bcut.verification.cut_data import Candidates, CertificateCut, cross
-from bcut.verification.exact_points import Simplex
+from bcut.verification.exact_points import Simplex, sign_of_order
 from bcut.verification.symmetries import Symmetries
 
 # Elements of a group that are listed, at most.
@@ -218,7 +218,7 @@ def _all_rows(rows: Mapping[Simplex, Fraction], group: Sequence[Element]) -> dic
         own: dict[Simplex, int] = {}
         for element in group:
             moved = [element.images[v] for v in row]
-            image, sign = tuple(sorted(moved)), element.sign * _parity(moved)
+            image, sign = tuple(sorted(moved)), element.sign * sign_of_order(moved)
             if own.setdefault(image, sign) != sign:
                 raise VerificationError(
                     f"a symmetry exchanges the sides of {list(image)}, so there is no such row"
@@ -238,9 +238,3 @@ def _mean(cut: CertificateCut, group: Sequence[Element]) -> CertificateCut:
             image = element.of(simplex)
             total[image] = total.get(image, Fraction(0)) + share
     return replace(cut, simplices=tuple(total), coefficients=tuple(total.values()))
-
-
-def _parity(points: Sequence[int]) -> int:
-    """Return the sign of the permutation that sorts some different numbers."""
-    inversions = sum(a > b for i, a in enumerate(points) for b in points[i + 1 :])
-    return -1 if inversions & 1 else 1

@@ -10,6 +10,9 @@ from math import floor
 from bcut.verification.cut_data import CertificateCut
 from bcut.verification.exact_points import Simplex
 
+# Cases within cases that are read.
+MAX_DEPTH = 200
+
 
 @dataclass(frozen=True)
 class CertificateData:

@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from bcut.verification.certificate_data import CaseData, CertificateData, RefutationData, StageData
+from bcut.verification.certificate_data import MAX_DEPTH, CaseData, CertificateData, RefutationData, StageData
 from bcut.verification.cut_data import CertificateCut
 from bcut.verification.entries import EntryReader
 from bcut.verification.exact_points import Simplex
-
-# Cases within cases that are read.
-MAX_DEPTH = 200
 
 
 class CertificateReader(EntryReader):

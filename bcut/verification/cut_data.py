@@ -64,6 +64,7 @@ class Candidates(SideTable):
         self.restrictions = restrictions
         self.spanning = spanning
         self._only: frozenset[Simplex] | None = None
+        # Of d-simplices and of smaller faces alike: they cross if they do not meet in a common face.
         self._crossing: dict[tuple[Simplex, Simplex], bool] = {}
         self._circuits: dict[Simplex, tuple[int, int]] = {}
 

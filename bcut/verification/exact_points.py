@@ -242,3 +242,9 @@ def _expansions(d: int) -> list[list[list[tuple[int, int, bool]]]]:
             ]
         )
     return plan
+
+
+def sign_of_order(order: Sequence[int]) -> int:
+    """Return the sign of the permutation that sorts some different numbers."""
+    inversions = sum(a > b for i, a in enumerate(order) for b in order[i + 1 :])
+    return -1 if inversions & 1 else 1

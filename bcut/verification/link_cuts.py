@@ -18,7 +18,7 @@ from typing import Any
 
 from bcut.errors import VerificationError
 from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of
-from bcut.verification.exact_points import SideTable, Simplex
+from bcut.verification.exact_points import SideTable, Simplex, sign_of_order
 
 
 def check_link(sides: SideTable, cut: CertificateCut) -> Fraction:
@@ -97,7 +97,7 @@ class _Circle:
         if a == b:
             return 0
         order = (*self.face, a, b)
-        return self.sides.orientation(tuple(sorted(order))) * _parity(order)
+        return self.sides.orientation(tuple(sorted(order))) * sign_of_order(order)
 
     def directions(self, points: list[int]) -> dict[int, int]:
         """Sort points around the face, from the direction of the first one on; those in one direction share a level."""
@@ -205,9 +205,3 @@ def _face(sides: SideTable, cut: CertificateCut) -> Simplex:
     if len(set(face)) != d - 1:
         raise VerificationError(f"link cut: its face {value} does not have {d - 1} vertices")
     return face
-
-
-def _parity(order: Sequence[int]) -> int:
-    """Return the sign of the permutation that sorts some different numbers."""
-    inversions = sum(a > b for i, a in enumerate(order) for b in order[i + 1 :])
-    return -1 if inversions & 1 else 1
