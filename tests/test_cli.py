@@ -21,7 +21,7 @@ import bcut
 from bcut.cli.main import bcut as program
 from bcut.cli.main import run
 from bcut.solving.methods import METHODS
-from bcut.solving.run import DEFAULT_SEPARATORS
+from bcut.solving.options import DEFAULT_SEPARATORS
 
 Captured = pytest.CaptureFixture[str]
 
@@ -361,10 +361,13 @@ def check_interrupted(status: int, out: str, err: str, file: Path) -> None:
     assert "triangulation verified" in bcut.verify(file).statement
 
 
-@pytest.mark.parametrize(("method", "stage"), [("listing", "root"), ("listing", "tree"), ("scip", "tree")])
+@pytest.mark.parametrize(
+    ("method", "stage"), [("listing", "root"), ("listing", "vertices"), ("listing", "tree"), ("scip", "tree")]
+)
 def test_ctrl_c_in_any_stage_keeps_what_was_found(method: str, stage: str, tmp_path: Path) -> None:
     file = tmp_path / "result.json"
-    arguments = ["solve", "random:20,3,seed=1001", "--spanning", "--no-separators"]
+    # The first target is out of reach, and without separators only the tree shows that.
+    arguments = ["solve", "random:22,3,seed=9", "--spanning", "--no-separators"]
     done = subprocess.run(
         [
             sys.executable,
@@ -450,11 +453,15 @@ def test_the_list_of_separators(capsys: Captured) -> None:
     assert {"clique", "odd-cycle", "convex-polygon"} <= set(families)
     assert all(entry["origin"] == "built-in" for entry in families.values())
     assert families["odd-cycle"]["parameters"]["backend"] == "scipy"
+    assert [name for name, entry in families.items() if entry["default"]] == list(DEFAULT_SEPARATORS)
+    assert families["clique"]["dissections"]
+    assert families["sphere"]["stage"] > families["parity"]["stage"] > families["link"]["stage"] == 0
     assert run(["separators", "list"]) == 0
     text = capsys.readouterr().out
     for name, entry in families.items():
         assert entry["description"].endswith("."), name
         assert " ".join(text.split()).count(f"{name} {entry['description']}") == 1
+        assert text.count("the default") == 1
 
 
 def test_a_separator_of_a_user_from_another_folder(

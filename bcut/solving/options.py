@@ -12,6 +12,11 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.separation.seam import Separator
 from bcut.solving.groups import GroupLike
 
+DEFAULT_SEPARATORS = ("link",)
+# Relaxations of stable sets are so weak that cliques close most of their gaps; link cuts are not valid for dissections.
+SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
+SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
+
 InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
 

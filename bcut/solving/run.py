@@ -32,17 +32,19 @@ from bcut.solving.groups import subgroups_to_try, symmetries_of
 from bcut.solving.levels import Levels, solve_listed
 from bcut.solving.memory import Watch, watched
 from bcut.solving.methods import Traits, check_method, choose_method
-from bcut.solving.options import InstanceLike, Options, SeparatorLike
+from bcut.solving.options import (
+    DEFAULT_SEPARATORS,
+    SEPARATORS_FOR_DISSECTIONS,
+    SEPARATORS_FOR_STABLE_SETS,
+    InstanceLike,
+    Options,
+    SeparatorLike,
+)
 from bcut.solving.orbit_stage import OrbitStage, orbit_stage
 from bcut.solving.programs import formulation_name, make_formulation
 from bcut.solving.report import make_result
 from bcut.solving.search import Part, Progress, Search, bound_at_root
 from bcut.solving.strategies import solve_in_scip
-
-DEFAULT_SEPARATORS = ("link",)
-# Relaxations of stable sets are so weak that cliques close most of their gaps; link cuts are not valid for dissections.
-SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
-SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
 
 
 class Run:

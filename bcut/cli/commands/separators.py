@@ -26,10 +26,12 @@ def separators() -> None:
 def list_command(as_json: bool) -> int:
     """List the cut families that can be called by name: the built-in ones and those of installed packages.
 
-    Parameters are written after a colon, as in --separator odd-cycle:max_cuts=40.
+    Parameters are written after a colon, as in --separator odd-cycle:max_cuts=40. A family of a later stage is
+    asked only about points for which those of earlier ones have nothing to add.
     """
     from bcut.cli.output import emit, emit_json
     from bcut.separation.resolve import available, built_in_names, parameters_of
+    from bcut.solving.options import DEFAULT_SEPARATORS
 
     built_in = set(built_in_names())
     entries = [
@@ -37,6 +39,9 @@ def list_command(as_json: bool) -> int:
             "name": name,
             "description": _description(family),
             "parameters": parameters_of(family),
+            "stage": family.stage,
+            "dissections": family.dissections,
+            "default": name in DEFAULT_SEPARATORS,
             "origin": "built-in" if name in built_in else f"{family.__module__}:{family.__qualname__}",
         }
         for name, family in available().items()
@@ -92,6 +97,12 @@ def _described(entry: dict[str, Any]) -> str:
     lines = [entry["name"], *(f"    {line}" for line in described)]
     if entry["origin"] != "built-in":
         lines.append(f"    from {entry['origin']}")
+    traits = [f"stage {entry['stage']}"]
+    if entry["default"]:
+        traits.append("the default")
+    if entry["dissections"]:
+        traits.append("for dissections too")
+    lines.append(f"    {', '.join(traits)}")
     if entry["parameters"]:
         listed = ", ".join(f"{name}={default}" for name, default in entry["parameters"].items())
         lines.append(f"    parameters: {listed}")
