@@ -226,6 +226,7 @@ def branch(
         seen = {} if cutoff is not None else {k: facts[k] for k in ("value", "bound") if facts[k] is not None}
         search.report("tree", columns=len(part.columns), nodes=facts["nodes"], **seen)
 
+    search.report("tree", columns=len(part.columns), nodes=0)
     with search.timed("tree"):
         tree = branch_and_cut(
             part.formulation,
