@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -321,6 +323,24 @@ def test_memory_is_measured() -> None:
     block = np.ones(1 << 24)
     assert used_memory() - before > block.nbytes // 2
     assert peak_memory() >= used_memory() // 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for one process")
+def test_an_interrupt_that_arrives_in_a_callback_is_sent_again() -> None:
+    def interrupted() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1)  # the interrupt is raised here, where ctypes can only report it
+
+    callback = ctypes.CFUNCTYPE(None)(interrupted)
+
+    def work() -> None:
+        callback()
+        time.sleep(20)
+
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), watched(Watch(), memory=None, deadline=None):
+        work()
+    assert time.monotonic() - started < 10
 
 
 def test_a_watched_block_is_interrupted_in_time_and_only_then() -> None:

@@ -131,7 +131,8 @@ def test_ctrl_c_keeps_the_incumbent_and_standard_output_clean() -> None:
     assert process.stdout is not None
     assert process.stderr is not None
     for line in process.stderr:
-        if json.loads(line)["stage"] == "tree":
+        facts = json.loads(line)
+        if facts["stage"] == "tree" and facts["bound"] is not None:
             process.send_signal(signal.SIGINT)
             break
     output, _ = process.communicate(timeout=60)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -45,8 +46,6 @@ def peak_memory() -> int:
         import resource
     except ImportError:
         return 0
-    import sys
-
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     # Bytes on macOS, kibibytes elsewhere.
     return int(peak) if sys.platform == "darwin" else int(peak) * 1024
@@ -57,7 +56,8 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
     """Interrupt the block, as Ctrl-C would, when the process uses too much memory or has no more time.
 
     Solvers and loops hear an interrupt within a moment and keep what they have found, and so one mechanism serves all
-    stages; those that watch the deadline themselves end before this does.
+    stages; those that watch the deadline themselves end before this does. An interrupt, also one by Ctrl-C, that
+    arrives where Python cannot raise it, in a callback of compiled code for one, is sent again.
 
     Nothing is watched outside the main thread, where interrupts do not arrive.
 
@@ -70,26 +70,39 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
     deadline : float or None
         Value of `time.monotonic`.
     """
-    if (memory is None and deadline is None) or threading.current_thread() is not threading.main_thread():
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    ended = threading.Event()
+    ended, unheard = threading.Event(), threading.Event()
 
     def look() -> None:
         while not ended.wait(_PERIOD):
-            if memory is not None and used_memory() > memory * GIB:
+            if unheard.is_set():
+                unheard.clear()
+            elif watch.reached:
+                continue
+            elif memory is not None and used_memory() > memory * GIB:
                 watch.reached = "memory"
             elif deadline is not None and time.monotonic() > deadline + _GRACE:
                 watch.reached = "time"
             else:
                 continue
             os.kill(os.getpid(), signal.SIGINT)
-            return
+
+    previous = sys.unraisablehook
+
+    def hook(unraisable: sys.UnraisableHookArgs) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            unheard.set()
+        else:
+            previous(unraisable)
 
     watcher = threading.Thread(target=look, name="bcut-limits", daemon=True)
     watcher.start()
+    sys.unraisablehook = hook
     try:
         yield
     finally:
         ended.set()
         watcher.join()
+        sys.unraisablehook = previous
