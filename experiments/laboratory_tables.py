@@ -2,7 +2,7 @@
 
     python experiments/laboratory_tables.py results
 
-Looks into the folders ``ablation-root``, ``parity``, ``strategy``, ``hard``, ``hard-root``, ``symmetric-root`` and
+Looks into the folders ``ablation-root``, ``parity``, ``strategy``, ``hard``, ``symmetric-root`` and
 ``min-cardinality`` of the one given, which are the results of the plans of these names, and puts a table for each that
 is there between the lines ``<!-- NAME -->`` and ``<!-- end of NAME -->`` of the pages in ``docs/``. Where no page has
 such lines it prints the table.
@@ -192,7 +192,6 @@ TABLES: dict[str, tuple[str, Sequence[Callable[[Experiment], str]]]] = {
     "strategy": ("strategy", (solves, foot)),
     "hard": ("hard", (totals, foot)),
     "hard instances": ("hard", (instances,)),
-    "hard roots": ("hard-root", (instances, foot)),
     "symmetric roots": ("symmetric-root", (instances, foot)),
     "minimum cardinality": ("min-cardinality", (solves, instances, foot)),
 }
