@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+import numpy as np
+from numpy.typing import NDArray
+
+from bcut.bounds.averaged import AveragedCut
 from bcut.bounds.averaged_root import AveragedStage
 from bcut.bounds.infeasibility import infeasibility_bound
+from bcut.bounds.orbit_cuts import OrbitCut
+from bcut.bounds.orbit_root import OrbitBound
 from bcut.bounds.root import Stage
 from bcut.bounds.safe import SafeBound
 from bcut.formulations.chambers import CHAMBER_ROW
@@ -128,28 +134,9 @@ def make_orbit_certificate(stage: OrbitStage) -> Certificate:
     bound, formulation = stage.root.bound, stage.formulation
     if bound is None:
         return Certificate(reason="the relaxation over orbits was not solved to optimality")
-    rows = len(formulation.row_faces)
-    multipliers: list[list[object]] = [
-        ["volume", str(Fraction(bound.coverage * formulation.volume, bound.denominator))]
-    ]
-    for face, multiplier in zip(
-        formulation.row_faces.tolist(), bound.multipliers[:rows].tolist(), strict=True
-    ):
-        if multiplier:
-            multipliers.append([face, str(Fraction(multiplier, bound.denominator))])
-    cuts = [
-        {
-            "family": "link",
-            "simplices": cut.simplices.tolist(),
-            "coefficients": cut.coefficients.tolist(),
-            "rhs": 0,
-            "multiplier": str(Fraction(multiplier, bound.denominator) / cut.factor),
-            # Weights of all wedges are no news: those that differ between directions are the coefficients.
-            "proof": {"face": list(cut.face)},
-        }
-        for cut, multiplier in zip(stage.cuts, bound.multipliers[rows:].tolist(), strict=True)
-        if multiplier
-    ]
+    total = Fraction(bound.coverage * formulation.volume, bound.denominator)
+    multipliers, weights = _orbit_multipliers("volume", total, formulation.row_faces, bound)
+    cuts = [_averaged_cut(cut, weight) for cut, weight in zip(stage.cuts, weights, strict=True) if weight]
     return Certificate(
         bound=str(stage.objective.sign * bound.value),
         flag=stage.flag.tolist(),
@@ -171,24 +158,38 @@ def case_data(case: Case) -> dict[str, object]:
 
 
 def _averaged_stage_data(stage: AveragedStage) -> dict[str, object]:
-    bound, rows = stage.bound, len(stage.row_faces)
-    multipliers: list[list[object]] = [
-        ["coverage", str(Fraction(bound.coverage * stage.order, bound.denominator))]
-    ]
-    for face, multiplier in zip(stage.row_faces.tolist(), bound.multipliers[:rows].tolist(), strict=True):
-        if multiplier:
-            multipliers.append([face, str(Fraction(multiplier, bound.denominator))])
+    bound = stage.bound
+    total = Fraction(bound.coverage * stage.order, bound.denominator)
+    multipliers, weights = _orbit_multipliers("coverage", total, stage.row_faces, bound)
     cuts = [
-        {
-            "family": "link",
-            "simplices": cut.simplices.tolist(),
-            "coefficients": cut.coefficients.tolist(),
-            "rhs": 0,
-            "multiplier": str(Fraction(multiplier, bound.denominator) / cut.factor),
-            "proof": {"face": list(cut.face)},
-            "group": cut.level,
-        }
-        for cut, multiplier in zip(stage.cuts, bound.multipliers[rows:].tolist(), strict=True)
-        if multiplier
+        {**_averaged_cut(cut, weight), "group": cut.level}
+        for cut, weight in zip(stage.cuts, weights, strict=True)
+        if weight
     ]
     return {"multipliers": multipliers, "cuts": cuts}
+
+
+def _orbit_multipliers(
+    name: str, total: Fraction, row_faces: NDArray[np.int64], bound: OrbitBound
+) -> tuple[list[list[object]], list[Fraction]]:
+    """Write out the multipliers of the named row and of the cocircuit rows; return those of the cuts beside them."""
+    values = [Fraction(multiplier, bound.denominator) for multiplier in bound.multipliers.tolist()]
+    rows = len(row_faces)
+    named: list[list[object]] = [[name, str(total)]]
+    named += [
+        [face, str(value)] for face, value in zip(row_faces.tolist(), values[:rows], strict=True) if value
+    ]
+    return named, values[rows:]
+
+
+def _averaged_cut(cut: OrbitCut | AveragedCut, multiplier: Fraction) -> dict[str, object]:
+    """Write out a link cut whose mean has this multiplier."""
+    return {
+        "family": "link",
+        "simplices": cut.simplices.tolist(),
+        "coefficients": cut.coefficients.tolist(),
+        "rhs": 0,
+        "multiplier": str(multiplier / cut.factor),
+        # Weights of all wedges are no news: those that differ between directions are the coefficients.
+        "proof": {"face": list(cut.face)},
+    }
