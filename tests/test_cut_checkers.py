@@ -17,6 +17,7 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.simplices import candidate_simplices
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
+from bcut.verification.crossing_cuts import exceeds
 from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut
 from bcut.verification.exact_points import ExactPoints, SideTable
 
@@ -187,6 +188,32 @@ def test_an_odd_cycle_needs_its_proof(proof: dict[str, Any], says: str) -> None:
     sides = SMALL["a point inside"].sides
     with pytest.raises(VerificationError, match=says):
         CUT_CHECKERS["odd-cycle"](sides, cut("odd-cycle", {(0, 1, 2): 1}, 1, proof))
+
+
+@given(st.data())
+def test_the_search_for_heavy_sets_agrees_with_all_sets(data: st.DataObject) -> None:
+    size = data.draw(st.integers(1, 7))
+    pairs = list(combinations(range(size), 2))
+    crossing = {pair for pair in pairs if data.draw(st.booleans())}
+    crossed = [
+        sum(1 << other for other in range(size) if {(v, other), (other, v)} & crossing) for v in range(size)
+    ]
+    weights = [Fraction(data.draw(st.integers(0, 4)), 2) for _ in range(size)]
+    nodes = data.draw(st.integers(0, (1 << size) - 1))
+    heaviest = max(
+        sum((weights[v] for v in chosen), Fraction(0))
+        for k in range(size + 1)
+        for chosen in combinations([v for v in range(size) if nodes >> v & 1], k)
+        if not crossing & set(combinations(chosen, 2))
+    )
+    assert exceeds(nodes, crossed, weights, heaviest - Fraction(1, 2))
+    assert not exceeds(nodes, crossed, weights, heaviest)
+
+
+def test_a_proof_that_would_keep_the_check_busy_is_refused() -> None:
+    # No two of sixty cross: all 2 ** 60 sets would be looked at.
+    with pytest.raises(VerificationError, match="a cut over 60 simplices or faces takes more than"):
+        exceeds((1 << 60) - 1, [0] * 60, [Fraction(1)] * 60, Fraction(60))
 
 
 def test_polygons_have_room_for_two_triangles_less_than_points() -> None:

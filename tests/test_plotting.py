@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import bcut
+from bcut.errors import InputError, VerificationError
 from bcut.plotting.depth import back_to_front
 from bcut.plotting.drawing import neighbour_colours
 
@@ -114,3 +115,22 @@ def test_other_formats(suffix: str, start: bytes, tmp_path: Path) -> None:
     bcut.plot(bcut.solve("moae"), file)
     assert file.read_bytes().startswith(start)
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
+
+
+def test_what_is_covered_of_a_region_is_drawn_inside_its_surface(tmp_path: Path) -> None:
+    found = bcut.region("twisted-prism:5,twist=10")
+    assert found.triangulation is not None
+    bcut.plot(found, tmp_path / "prism.svg", explode=0)
+    picture = (tmp_path / "prism.svg").read_text()
+    # All edges of the surface: two triangulated pentagons, and ten triangles at the sides.
+    assert picture.count("stroke-dasharray") == 24
+    assert filled_paths(tmp_path / "prism.svg") == 4 * len(found.triangulation) + 24
+
+
+def test_a_region_of_which_nothing_is_covered_or_that_does_not_hold_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="nothing of the region is covered"):
+        bcut.plot(bcut.region("schoenhardt"), tmp_path / "nothing.svg")
+    data = bcut.region("twisted-prism:5,twist=10").to_dict()
+    with pytest.raises(VerificationError, match="the tetrahedra cover"):
+        bcut.plot({**data, "triangulation": data["triangulation"][1:]}, tmp_path / "less.svg")
+    assert not list(tmp_path.iterdir())

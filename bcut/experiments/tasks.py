@@ -24,7 +24,7 @@ SCHEMA = 1
 
 # Parts of the package that no result depends on; of the experiments, these do the work of a run.
 _ASIDE = ("cli", "plotting", "experiments")
-_AT_WORK = ("execute.py", "measuring.py", "sizes.py", "recording.py", "ledger.py")
+_AT_WORK = ("execute.py", "presets.py", "measuring.py", "sizes.py", "recording.py", "ledger.py")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -54,7 +54,13 @@ def draw_plane(figure: Figure, points: Floats, triangles: Simplices, *, labels: 
 
 
 def draw_space(
-    figure: Figure, points: Floats, tetrahedra: Simplices, *, explode: float, labels: bool
+    figure: Figure,
+    points: Floats,
+    tetrahedra: Simplices,
+    *,
+    outline: Simplices,
+    explode: float,
+    labels: bool,
 ) -> None:
     """Draw a triangulation of points in space, its tetrahedra moved apart, or see-through where they are not.
 
@@ -63,6 +69,8 @@ def draw_space(
     figure : Figure
     points : ndarray of float, shape (n, 3)
     tetrahedra : ndarray of int, shape (m, 4)
+    outline : ndarray of int, shape (k, 2)
+        Edges to draw behind them, where they are in fact.
     explode : float
         How far they are moved, in units of their distance from the middle.
     labels : bool
@@ -87,6 +95,9 @@ def draw_space(
         PolyCollection(faces, facecolors=fills, edgecolors=INK, linewidths=0.7, joinstyle="round")
     )
     flat = projected(points)
+    axes.add_collection(
+        LineCollection(list(flat[outline]), colors=INK, linewidths=0.8, linestyles="dotted", zorder=0)
+    )
     if not explode:
         axes.scatter(flat[:, 0], flat[:, 1], s=18, color=INK, zorder=3)
     finish(axes, flat, labels)

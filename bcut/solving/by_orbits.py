@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import comb, inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from bcut.solving.orbit_branching import branch_over_faces
 from bcut.solving.orbit_stage import OrbitStage
 from bcut.solving.search import Part, Search, branch
 from bcut.solving.strategies import is_optimal
+
+if TYPE_CHECKING:
+    from bcut.scip.host import TreeStatus
 
 # SCIP looks at a program with at most so many columns for some seconds before subgroups are tried.
 _SMALL = 15_000
@@ -238,14 +241,14 @@ def _reach(
     """Look for a triangulation of the target value, times sign, on the columns that may be in one."""
     part = search.whole
     cutoff = target + stage.objective.unit / 2
-    decided = ""
+    decided: TreeStatus | None = None
     if len(part.columns) <= _SMALL:
         decided = _branch(search, part, cutoff, seconds=_SECONDS_FOR_SMALL)
         if decided != "interrupted" and not is_optimal(search):
             known = decided == "infeasible"
             if _branch_over_faces(search, stage, target, cuts=cuts, known=known):
                 return "refuted"
-    if decided in ("", "limit") and not is_optimal(search):
+    if decided in (None, "limit") and not is_optimal(search):
         left = search.seconds_left
         seconds = inf if left is None else _SHARE_FOR_TARGET * left
         _search_invariant(search, stage, cutoff=cutoff, goal=target, seconds=seconds)
@@ -308,7 +311,7 @@ def _branch_over_faces(
     return True
 
 
-def _branch(search: Search, part: Part, cutoff: Fraction, *, seconds: float | None = None) -> str:
+def _branch(search: Search, part: Part, cutoff: Fraction, *, seconds: float | None = None) -> TreeStatus:
     """Let SCIP search a part with all triangulations below the cutoff; the best of them is the best of all."""
     status = branch(search, part, None, cutoff=float(search.sign * cutoff), seconds=seconds)
     if status == "optimal" and search.value is not None:

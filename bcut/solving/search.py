@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from bcut.result import Certificate, Status
 from bcut.separation.driver import FamilyStatistics, Separation
 from bcut.separation.observer import CutObserver
 from bcut.separation.seam import Problem, Separator
+
+if TYPE_CHECKING:
+    from bcut.scip.host import TreeStatus
 
 Progress = Callable[[dict[str, Any]], None]
 
@@ -196,7 +199,7 @@ def branch(
     *,
     cutoff: float | None = None,
     seconds: float | None = None,
-) -> str:
+) -> TreeStatus:
     """Let SCIP search a part, with the cuts and separators of its root bound; returns SCIP's status.
 
     Parameters

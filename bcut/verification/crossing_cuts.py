@@ -11,6 +11,9 @@ from bcut.errors import VerificationError
 from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of
 from bcut.verification.exact_points import SideTable, Simplex
 
+# A made-up proof could keep the check busy for ever; cuts of the built-in families take less than a hundred.
+_MOST_STEPS = 100_000
+
 
 def check_clique(sides: SideTable, cut: CertificateCut) -> Fraction:
     """Check that at most one of the simplices is in a triangulation, and that none alone violates the cut.
@@ -117,16 +120,30 @@ def _check_lifting(
 
 
 def exceeds(nodes: int, crossed: Sequence[int], weights: Sequence[Fraction], limit: Fraction) -> bool:
-    """Tell whether some of the nodes that do not cross each other weigh more than a limit."""
-    if limit < 0:
-        return True
-    while nodes:
-        lowest = nodes & -nodes
-        nodes ^= lowest
-        node = lowest.bit_length() - 1
-        if weights[node] > 0 and exceeds(nodes & ~crossed[node], crossed, weights, limit - weights[node]):
+    """Tell whether some of the nodes that do not cross each other weigh more than a limit.
+
+    Raises
+    ------
+    VerificationError
+        The search takes too long: it is refused rather than believed.
+    """
+    open_sets = [(nodes, limit)]
+    for _ in range(_MOST_STEPS):
+        if not open_sets:
+            return False
+        free, left = open_sets.pop()
+        if left < 0:
             return True
-    return False
+        if free:
+            lowest = free & -free
+            node = lowest.bit_length() - 1
+            open_sets.append((free ^ lowest, left))
+            if weights[node] > 0:
+                open_sets.append(((free ^ lowest) & ~crossed[node], left - weights[node]))
+    raise VerificationError(
+        f"a cut over {len(weights)} simplices or faces takes more than {_MOST_STEPS} steps to check, and is not "
+        "believed; solve again without its family"
+    )
 
 
 def _check_not_flat(candidates: Candidates, cut: CertificateCut) -> None:

@@ -28,6 +28,8 @@ def plot(
 ) -> int:
     """Draw the triangulation of the file RESULT: polygons in 2D, tetrahedra moved apart in 3D.
 
+    Of a region that has none, what is covered is drawn, with the edges of its surface dotted.
+
     Needs matplotlib: pip install "bcut[plot]".
     """
     from bcut.cli.running import check_output
