@@ -41,7 +41,7 @@ end.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -325,40 +325,3 @@ class _Walks:
         if head >= self.size:
             return int(self.least[head - self.size, tail])
         return int(self.least[head, tail + self.size])
-
-
-def check_cut(
-    problem: Problem, face: Sequence[int], columns: NDArray[np.integer], coefficients: NDArray[np.integer]
-) -> bool:
-    """Prove a link cut ``coefficients @ x[columns] <= 0`` again, from nothing but the configuration.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its simplices are all that a solution may use.
-    face : sequence of int
-        The (d-2)-face e.
-    columns, coefficients : ndarrays of int
-        The inequality.
-
-    Returns
-    -------
-    bool
-        Whether e is interior, all simplices of the cut contain e, and no once-winding closed walk of wedges
-        has a positive sum of coefficients: then no triangulation violates the cut.
-    """
-    stars = Stars(problem.chirotope, problem.simplices)
-    matches = np.flatnonzero((stars.faces == np.sort(np.asarray(face))).all(axis=1))
-    if len(matches) != 1:
-        return False
-    star = stars.star(int(matches[0]))
-    place = np.full(len(problem.simplices), -1)
-    place[star.columns] = np.arange(len(star.columns))
-    if (place[columns] < 0).any():
-        return False
-    costs = np.zeros(len(star.columns), dtype=np.int64)
-    costs[place[columns]] = -np.asarray(coefficients)
-    walks = _Walks(star)
-    for wedge in np.argsort(star.tails, kind="stable").tolist():
-        walks.add(wedge, int(costs[wedge]))
-    return all(walks.rest(wedge) + int(costs[wedge]) >= 0 for wedge in range(len(costs)))

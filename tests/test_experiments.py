@@ -354,7 +354,7 @@ def test_a_run_depends_on_the_sources_and_refuses_others(
     (task,) = tasks_from(tmp_path, ONE)
     with pytest.raises(InputError, match=r"planned with another version \(sources\)"):
         carry_out({**task.data, "code": {**task.data["code"], "sources": "other"}})
-    monkeypatch.setattr("bcut.experiments.tasks.sources_digest", lambda: "other")
+    monkeypatch.setattr("bcut.experiments.versions.sources_digest", lambda: "other")
     (other,) = tasks_from(tmp_path, ONE)
     assert other.fingerprint != task.fingerprint
 

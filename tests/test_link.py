@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -11,14 +14,20 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 import bcut
+from bcut.errors import VerificationError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.geometry.stars import Star, Stars
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.separation.driver import to_integers
-from bcut.separation.seam import FractionalPoint, Problem
+from bcut.separation.seam import Cut, FractionalPoint, Problem
 from bcut.separation.small_lp import SmallLps
-from bcut.separators.link import Link, check_cut, lift_weights, most_violated_weights
+from bcut.separators.link import Link, lift_weights, most_violated_weights
+from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut
+from bcut.verification.exact_points import ExactPoints
+
+# The checker that ledgers and certificates use: it shares neither stars nor walks with the separator.
+check_link = CUT_CHECKERS["link"]
 
 SMALL = [
     ("polygon:5,center", False),
@@ -40,6 +49,19 @@ SMALL = [
 
 def problem_of(name: str, spanning: bool = False) -> Problem:
     return Problem(cocircuit_formulation(load_instance(name), spanning=spanning))
+
+
+def candidates_of(problem: Problem) -> Candidates:
+    """All that the independent checker is told: the points, and whether all of them are to be used."""
+    return Candidates(ExactPoints(problem.configuration.scalars()), spanning=problem.formulation.spanning)
+
+
+def as_certified(problem: Problem, cut: Cut) -> CertificateCut:
+    """A cut as ledgers and certificates have it: by vertices."""
+    simplices = tuple(map(tuple, problem.simplices[np.asarray(cut.simplices)].tolist()))
+    assert cut.coefficients is not None
+    coefficients = tuple(Fraction(int(value)) for value in cut.coefficients)
+    return CertificateCut("link", simplices, coefficients, Fraction(cut.rhs), Fraction(0), cut.proof)
 
 
 def triangulation_matrix(problem: Problem) -> np.ndarray:
@@ -184,6 +206,7 @@ def test_the_proof_holds_all_that_alpha_needs() -> None:
 def test_no_cut_removes_a_triangulation(name: str, spanning: bool, lift: bool) -> None:
     problem = problem_of(name, spanning)
     matrix = triangulation_matrix(problem)
+    candidates = candidates_of(problem)
     separator = Link(lift=lift)
     separator.setup(problem)
     rng = np.random.default_rng(11)
@@ -191,7 +214,7 @@ def test_no_cut_removes_a_triangulation(name: str, spanning: bool, lift: bool) -
         for cut in separator.separate(FractionalPoint(problem, point)):
             exact = to_integers(cut, "link", len(point))
             assert (matrix[:, exact.columns] @ exact.coefficients <= exact.rhs).all()
-            assert check_cut(problem, cut.proof["face"], exact.columns, exact.coefficients)
+            assert check_link(candidates, as_certified(problem, cut)) == 0
 
 
 def affine_points(matrix: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
@@ -205,27 +228,87 @@ def affine_points(matrix: np.ndarray, rng: np.random.Generator) -> list[np.ndarr
     return points
 
 
-def test_checker_refuses_a_strengthened_cut() -> None:
+@pytest.fixture(scope="module")
+def found_cuts() -> tuple[Candidates, list[CertificateCut]]:
+    """Cuts of vertices of the relaxation of fewest simplices, and what the checker knows of the points."""
     problem = problem_of("random:12,3,seed=1000", spanning=True)
     separator = Link()
     separator.setup(problem)
-    tested = 0
+    formulation, found = problem.formulation, []
     for seed in range(30):
         costs = 1 + 0.1 * np.random.default_rng(seed).random(len(problem.simplices))
-        formulation = problem.formulation
         x = linprog(costs, A_eq=formulation.matrix, b_eq=formulation.lower).x
-        for cut in separator.separate(FractionalPoint(problem, x)):
-            columns, coefficients = np.asarray(cut.simplices), np.asarray(cut.coefficients)
-            assert check_cut(problem, cut.proof["face"], columns, coefficients)
-            # Lifted coefficients are the largest valid ones in some order, so not all of them can grow.
-            assert not check_cut(
-                problem, cut.proof["face"], columns, coefficients + int(np.abs(coefficients).max())
-            )
-            assert not check_cut(
-                problem, [0, 1] if cut.proof["face"] != [0, 1] else [0, 2], columns, coefficients
-            )
-            tested += 1
-    assert tested > 0
+        found += [as_certified(problem, cut) for cut in separator.separate(FractionalPoint(problem, x))]
+    assert found
+    return candidates_of(problem), found
+
+
+def test_the_checker_accepts_what_was_found(found_cuts: tuple[Candidates, list[CertificateCut]]) -> None:
+    candidates, found = found_cuts
+    for cut in found:
+        # A triangulation without the face has 0 on the left, so nothing less than 0 can follow.
+        assert check_link(candidates, cut) == cut.rhs == 0
+        without_reasons = replace(cut, proof={"face": cut.proof["face"]})
+        assert check_link(candidates, without_reasons) == 0
+
+
+def raised(cut: CertificateCut) -> CertificateCut:
+    """With one coefficient, that of the lightest simplex, raised by more than any walk has to spare."""
+    coefficients = list(cut.coefficients)
+    lowest = coefficients.index(min(coefficients))
+    coefficients[lowest] += 1 + sum(map(abs, coefficients))
+    return replace(cut, coefficients=tuple(coefficients))
+
+
+def of_another_face(cut: CertificateCut) -> CertificateCut:
+    """With the proof of a face that some of the simplices do not contain."""
+    vertices = {vertex for simplex in cut.simplices for vertex in simplex}
+    other = sorted(vertices - set(cut.proof["face"]))[:2]
+    return replace(cut, proof={**cut.proof, "face": other})
+
+
+def with_a_stranger(cut: CertificateCut) -> CertificateCut:
+    """With one more simplex, which does not contain the face."""
+    return replace(
+        cut, simplices=(*cut.simplices, (0, 1, 2, 3)), coefficients=(*cut.coefficients, Fraction(1))
+    )
+
+
+def with_more_alpha(cut: CertificateCut) -> CertificateCut:
+    """With the same inequality, but another reason: more than the lightest walk weighs."""
+    return replace(cut, proof={**cut.proof, "alpha": cut.proof["alpha"] + 1})
+
+
+def with_lighter_wedges(cut: CertificateCut) -> CertificateCut:
+    """With weights in the proof that are all too small for its alpha."""
+    wedges = [[tail, head, 0] for tail, head, _ in cut.proof["wedges"]]
+    return replace(cut, proof={**cut.proof, "wedges": wedges})
+
+
+@pytest.mark.parametrize(
+    ("tamper", "says"),
+    [
+        (lambda cut: replace(cut, rhs=cut.rhs - 1), "wind around it once reach 0"),
+        (
+            lambda cut: replace(cut, coefficients=tuple(c + 1 for c in cut.coefficients)),
+            "wind around it once reach",
+        ),
+        (raised, "wind around it once reach"),
+        (of_another_face, "does not contain the face"),
+        (with_a_stranger, "does not contain the face"),
+        (with_more_alpha, "weigh at least"),
+        (with_lighter_wedges, "weigh at least"),
+    ],
+)
+def test_tampered_cuts_are_refused(
+    tamper: Callable[[CertificateCut], CertificateCut],
+    says: str,
+    found_cuts: tuple[Candidates, list[CertificateCut]],
+) -> None:
+    candidates, found = found_cuts
+    for cut in found:
+        with pytest.raises(VerificationError, match=says):
+            check_link(candidates, tamper(cut))
 
 
 @settings(max_examples=25, deadline=None)

@@ -9,13 +9,16 @@ since 0 <= X_o <= |o|; cuts ``a X <= 0`` take part with multipliers that are not
 duals are rounded to fractions over one denominator, and everything is computed again from these integers.
 Inexact duals leave some r_o slightly below zero, which costs a lot where orbits are long; so z is lowered
 until no r_o is negative, where that is possible (all volumes are positive) and gains something.
+
+Integers are of 64 bits where a bound on what is computed with them shows that it stays below 2**63 in size, and
+Python's elsewhere.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import floor
+from math import floor, ldexp
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -23,14 +26,16 @@ from numpy.typing import NDArray
 
 from bcut.bounds.large_program import LARGE, solve_large_program
 from bcut.bounds.linear_program import LinearProgram, solve_linear_program
+from bcut.bounds.safe import exponent_of
 from bcut.objectives.objective import Objective
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
 
-# Multipliers are multiples of 2**-SHIFT, or of less where 64 bits do not suffice otherwise.
+# Where costs and duals are around 1, multipliers are multiples of 2**-SHIFT.
 SHIFT = 45
-# Larger volumes are compared with the hull's volume, in integers of any size.
+# From this size on, the hull's volume is a factor of the denominator: without it, multipliers of the volume row would
+# be too coarse.
 _LARGE = 1 << 40
 
 
@@ -91,8 +96,7 @@ class OrbitBound:
 
     def orbits_within(self, target: Fraction) -> NDArray[np.intp]:
         """List the orbits that a triangulation with ``sign * objective <= target`` may use (reduced-cost fixing)."""
-        slack = (target - self.value) * self.denominator
-        return np.flatnonzero(self.reduced_costs <= int(slack.__floor__()))
+        return np.flatnonzero(self.reduced_costs <= floor((target - self.value) * self.denominator))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,31 +140,32 @@ def orbit_root(
     seconds : float, optional
         Time limit of the linear program.
     """
-    if not len(formulation.simplices):
-        return OrbitRoot("infeasible")
+    if not formulation.volumes.any():
+        return OrbitRoot("infeasible")  # nothing covers anything
     program = _program(formulation, objective)
     large = len(program.costs) >= LARGE
     solve = solve_large_program if large else solve_linear_program
     solution = solve(program, method=method, seconds=seconds)
     if solution.status == "infeasible" or (solution.status == "limit" and not large):
         return OrbitRoot(solution.status)
-    bound = safe_orbit_bound(
-        formulation, objective, _unscaled(formulation, solution.duals[1:]), float(solution.duals[0])
-    )
+    unit = float(objective.solver_unit)
+    duals = solution.duals * unit
+    bound = safe_orbit_bound(formulation, objective, _unscaled(formulation, duals[1:]), float(duals[0]))
     if solution.status == "limit":
         return OrbitRoot("limit", bound=bound)
-    return OrbitRoot("optimal", objective.sign * solution.value, solution.x, bound)
+    return OrbitRoot("optimal", objective.sign * solution.value * unit, solution.x, bound)
 
 
 def _program(formulation: OrbitProgram, objective: Objective) -> LinearProgram:
-    """Return the program with the coverage row first, divided by the hull's volume.
+    """Return the program with the coverage row first, divided by the hull's volume, and costs in solvers' units.
 
     X <= |o| is left out: the other rows imply it, as each simplex contains a generic point, and each generic point is
     covered once.
     """
     import scipy.sparse as sp
 
-    shares = np.true_divide(formulation.volumes, formulation.volume).astype(float)
+    # Quotients of Python's integers do not overflow where the integers are beyond all doubles.
+    shares = (formulation.volumes.astype(object) / formulation.volume).astype(float)
     # Rows with entries around 1 suit the solver best.
     scale = float(np.abs(shares).max())
     blocks = [sp.csr_matrix(shares / scale), formulation.matrix.astype(float)]
@@ -171,7 +176,7 @@ def _program(formulation: OrbitProgram, objective: Objective) -> LinearProgram:
     lower, upper = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[0])
     lower[0] = upper[0] = 1 / scale
     lower[1 + formulation.matrix.shape[0] :] = -np.inf
-    return LinearProgram(objective.sign * objective.costs, matrix, lower, upper)
+    return LinearProgram(objective.sign * objective.solver_costs, matrix, lower, upper)
 
 
 def _unscaled(formulation: OrbitProgram, duals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -196,26 +201,26 @@ def safe_orbit_bound(
     coverage : float
         Multiplier of the coverage row, if that row were divided by the largest of its entries' sizes.
     """
-    volumes, volume = formulation.volumes, formulation.volume
-    largest = max(map(abs, volumes.tolist()))
-    small = volumes.dtype == np.int64 and abs(volume) < _LARGE and largest < _LARGE
+    duals = np.where(np.isfinite(duals), duals, 0.0)
+    coverage = float(coverage) if np.isfinite(coverage) else 0.0
+    volume, largest = formulation.volume, max(1, _most(formulation.volumes))
     columns = _columns(formulation)
-    shift = _shift(columns, objective, duals, coverage)
-    denominator = (1 << shift) * (1 if small else abs(volume))
-    unit = denominator >> shift
-    multipliers = np.rint(np.nan_to_num(duals) * 2.0**shift).astype(np.int64)
+    sizes = abs(columns).astype(float)
+    shift = _shift(sizes, objective, duals, coverage)
+    denominator = (1 << max(0, shift)) * (volume if max(volume, largest) >= _LARGE else 1)
+    # Multipliers of the rows are multiples of 2**-shift, which is so much over the denominator.
+    unit = denominator >> shift if shift >= 0 else denominator << -shift
+    multipliers: NDArray[Any] = np.rint(np.ldexp(duals, shift)).astype(np.int64)
     rows = formulation.matrix.shape[0]
     multipliers[rows:] = np.minimum(multipliers[rows:], 0)
-    share = Fraction(float(np.nan_to_num(coverage))) * denominator / largest
-    cover = round(share)
-    if small and objective.fits_64_bits:
-        reduced = _costs(objective, denominator) - columns.T @ multipliers
-    else:
-        products = columns.T @ multipliers
-        multipliers = multipliers.astype(object) * unit
-        reduced = _costs(objective, denominator).astype(object) - products.astype(object) * unit
+    products = _products(columns, sizes, multipliers)
+    if unit != 1:
+        multipliers, products = multipliers.astype(object) * unit, products.astype(object) * unit
+    # Where they have 64 bits, costs are at most 2**61 in size and products hardly exceed 2**62.
+    reduced = _costs(objective, denominator) - products
+    cover = round(Fraction(coverage) * denominator / largest)
     bounds = [_with_coverage(formulation, reduced, cover)]
-    lowered = _lowered(volumes, bounds[0][1])
+    lowered = _lowered(formulation.volumes, bounds[0][1])
     if lowered:
         bounds.append(_with_coverage(formulation, reduced, cover - lowered))
     total, left, chosen = max(bounds, key=lambda bound: bound[0])
@@ -230,11 +235,42 @@ def _columns(formulation: OrbitProgram) -> sp.csr_matrix:
     return matrix if formulation.cuts is None else sp.vstack((matrix, formulation.cuts), format="csr")
 
 
+def _most(values: NDArray[Any]) -> int:
+    """Return the largest size of some integers."""
+    return max(-int(values.min(initial=0)), int(values.max(initial=0)))
+
+
+def _products(columns: sp.csr_matrix, sizes: sp.csr_matrix, multipliers: NDArray[np.int64]) -> NDArray[Any]:
+    """Return the products of integer multipliers with the columns: of 64 bits where those do not exceed 2**62 noticeably.
+
+    Parameters
+    ----------
+    columns : scipy.sparse.csr_matrix of int64, shape (rows, m)
+    sizes : scipy.sparse.csr_matrix of float, shape (rows, m)
+        Their absolute values.
+    multipliers : ndarray of int64, shape (rows,)
+        Up to 2**61 in size.
+    """
+    # No partial sum exceeds the sum of the sizes, which rounding changes by (k + 2) * 2**-53 of it, for k entries: next
+    # to nothing of what is left to 2**63.
+    if float((sizes.T @ np.abs(multipliers).astype(float)).max(initial=0.0)) < 2.0**62:
+        small: NDArray[np.int64] = columns.T @ multipliers
+        return small
+    entries = columns.tocoo()
+    products = np.zeros(columns.shape[1], dtype=object)
+    np.add.at(products, entries.col, entries.data.astype(object) * multipliers[entries.row].astype(object))
+    return products
+
+
 def _with_coverage(
     formulation: OrbitProgram, reduced: NDArray[Any], cover: int
 ) -> tuple[int, NDArray[Any], int]:
     """Return the bound and the reduced costs with a multiplier of the volume row, over the denominator."""
-    left = reduced - formulation.volumes * cover
+    volumes = formulation.volumes
+    # With large volumes, the denominator makes the multiplier have more than 40 bits, in addition to theirs.
+    if _most(reduced) + max(1, _most(volumes)) * abs(cover) >= 2**63:
+        reduced, volumes = reduced.astype(object), volumes.astype(object)
+    left = reduced - volumes * cover
     negative = np.flatnonzero(left < 0)
     loss = sum(
         size * cost
@@ -248,25 +284,38 @@ def _lowered(volumes: NDArray[Any], reduced: NDArray[Any]) -> int:
     negative = np.flatnonzero(reduced < 0)
     pairs = list(zip(reduced[negative].tolist(), volumes[negative].tolist(), strict=True))
     # Of irrational volumes this is one coefficient, of any sign.
-    if not pairs or min(volumes.tolist()) <= 0:
+    if not pairs or volumes.min() <= 0:
         return 0
     return max(-(cost // volume) for cost, volume in pairs)
 
 
 def _costs(objective: Objective, denominator: int) -> NDArray[Any]:
-    """Return ``floor(sign * cost * denominator)``."""
+    """Return ``floor(sign * cost * denominator)``, of 64 bits where none exceeds 2**61 in size."""
     scale = objective.sign * denominator
-    values = [floor(cost * scale) for cost in objective.exact_costs(np.arange(len(objective.numerators)))]
-    fits = max(map(abs, values), default=0) < 2**62
+    if objective.are_doubles:
+        values = [floor(Fraction(cost) * scale) for cost in objective.numerators.tolist()]
+    else:
+        values = [int(cost) * scale // objective.denominator for cost in objective.numerators.tolist()]
+    fits = max(map(abs, values), default=0) <= 2**61
     return np.array(values, dtype=np.int64 if fits else object)
 
 
-def _shift(columns: sp.csr_matrix, objective: Objective, duals: NDArray[np.floating], coverage: float) -> int:
-    """Return the largest shift up to `SHIFT` for which a reduced cost stays below 2**61."""
-    sizes = np.abs(np.nan_to_num(duals))
-    size = float(np.abs(objective.costs).max(initial=1.0)) + 2 * abs(float(np.nan_to_num(coverage)))
-    size += float((abs(columns).T @ sizes).max(initial=0.0)) + float(sizes.max(initial=0.0))
-    shift = SHIFT
-    while shift > 0 and size * 2.0**shift >= 2.0**61:
-        shift -= 1
-    return shift
+def _shift(sizes: sp.csr_matrix, objective: Objective, duals: NDArray[np.floating], coverage: float) -> int:
+    """Return the largest shift for which a reduced cost stays below 2**61, but no more than numbers of this size need.
+
+    It is negative where costs or multipliers are huge.
+    """
+    largest = max(
+        float(np.abs(objective.costs).max(initial=0.0)),
+        float(np.abs(duals).max(initial=0.0)),
+        abs(coverage),
+    )
+    if largest == 0.0:
+        return SHIFT
+    # By a power of two less, so that nothing overflows on the way.
+    power = exponent_of(largest)
+    costs, scaled = np.abs(np.ldexp(objective.costs, -power)), np.abs(np.ldexp(duals, -power))
+    size = float(costs.max(initial=0.0)) + 2 * abs(ldexp(coverage, -power))
+    size += float((sizes.T @ scaled).max(initial=0.0)) + float(scaled.max(initial=0.0))
+    power += exponent_of(size)
+    return min(SHIFT - min(0, power), 61 - power)

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Any
 
-from distributed import Client, LocalCluster, as_completed
+from distributed import Client, KilledWorker, LocalCluster, as_completed
 
 from bcut.errors import ExperimentError
 from bcut.experiments.pools import Tasks
@@ -95,11 +95,9 @@ class DaskPool(AbstractContextManager["DaskPool"]):
                 yield names[future], future.result()
             elif future.status == "error":
                 error = future.exception()
-                message = f"the run was lost with its workers: {error}"
-                yield (
-                    names[future],
-                    Outcome(error={"kind": type(error).__name__, "message": message, "trace": ""}),
-                )
+                lost = isinstance(error, KilledWorker)
+                message = f"the run was lost with its workers: {error}" if lost else ""
+                yield names[future], Outcome.of_exception(error, message)
             else:
                 raise ExperimentError(
                     "the connection to the scheduler was lost; what had ended is stored, start the experiment again"

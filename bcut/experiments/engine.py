@@ -12,7 +12,8 @@ from bcut.experiments.plan import Plan, read_plan
 from bcut.experiments.pools import make_pool
 from bcut.experiments.process import Outcome
 from bcut.experiments.store import Store, default_workers
-from bcut.experiments.tasks import SCHEMA, Task, code_version, machine, tasks_of
+from bcut.experiments.tasks import SCHEMA, Task, tasks_of
+from bcut.experiments.versions import code_version, machine
 
 Watcher = Callable[["Progress"], None]
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from bcut.errors import BcutError, InputError
 from bcut.experiments.presets import Run
-from bcut.experiments.tasks import code_version, digest_of, machine
+from bcut.experiments.versions import code_version, digest_of, machine
 
 RECORD, LEDGER, ERROR = "record.json", "ledger.gz", "error.json"
 

@@ -49,7 +49,13 @@ class LocalPool(AbstractContextManager["LocalPool"]):
             # In short steps, so that Ctrl-C is heard on every system.
             done, _ = wait(waiting, timeout=0.5, return_when=FIRST_COMPLETED)
             for future in done:
-                yield waiting.pop(future), future.result()
+                fingerprint = waiting.pop(future)
+                # What went wrong around the process of one run is no matter of the others.
+                try:
+                    outcome = future.result()
+                except Exception as error:
+                    outcome = Outcome.of_exception(error)
+                yield fingerprint, outcome
 
     def __exit__(
         self,

@@ -1,6 +1,6 @@
 """What a run does: the presets of plans, each a way to work on one problem.
 
-Solvers are imported where they are needed: a run that only counts rows loads none.
+A solver is imported by the presets that use it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from bcut.errors import InputError
 from bcut.experiments.ledger import LedgerWriter
 from bcut.experiments.measuring import delaunay, measured_at
 from bcut.experiments.recording import Recorder
-from bcut.experiments.variants import named
+from bcut.experiments.scip_names import DEFAULT, named
 
 
 class Run:
@@ -102,7 +102,7 @@ class Run:
             nodes=1,
             seed=self.settings["seed"],
             cutoff=self._cutoff(objective),
-            scip_separators="default" in self.settings["scip"],
+            scip_separators=DEFAULT in self.settings["scip"],
             named=limited,
             unlimited=unlimited,
             presolve=False,

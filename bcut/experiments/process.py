@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
@@ -43,6 +44,13 @@ class Outcome:
     ledger: bytes | None = None
     error: dict[str, str] | None = None
 
+    @staticmethod
+    def of_exception(error: BaseException, message: str = "") -> Outcome:
+        """Return the outcome of a run that could not be started or read: no disk space, no memory for a process."""
+        trace = "".join(traceback.format_exception(error))
+        said = message or f"the run could not be carried out: {error or type(error).__name__}"
+        return Outcome(error={"kind": type(error).__name__, "message": said, "trace": trace})
+
 
 def run_in_process(task: Mapping[str, Any], stop: Callable[[], bool] = lambda: False) -> Outcome:
     """Carry out a run in a process of its own, and wait for it.
@@ -52,6 +60,11 @@ def run_in_process(task: Mapping[str, Any], stop: Callable[[], bool] = lambda: F
     task : mapping
     stop : callable
         Asked again and again; once it says true, the process is ended.
+
+    Raises
+    ------
+    OSError
+        This machine has no room for another process or its files.
     """
     with tempfile.TemporaryDirectory(prefix="bcut-run-") as folder:
         place = Path(folder)

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
-import importlib.metadata
 import json
-import os
-import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import bcut
 from bcut.errors import InputError
 from bcut.experiments.cases import Case, load_case, objective_file
 from bcut.experiments.plan import Plan
 from bcut.experiments.variants import Variant
+from bcut.experiments.versions import code_version, digest_of
 from bcut.separation.resolve import Specification
 
 SCHEMA = 1
-
-# Parts of the package that no result depends on; of the experiments, these do the work of a run.
-_ASIDE = ("cli", "plotting", "experiments")
-_AT_WORK = ("execute.py", "presets.py", "measuring.py", "sizes.py", "recording.py", "ledger.py")
 
 
 @dataclass(frozen=True)
@@ -99,69 +91,3 @@ def _files(case: Case, variant: Variant, measures: tuple[str, ...]) -> dict[str,
     paths = [specification.source for specification in specifications if specification.is_file]
     paths += [file for text in (case.objective, *measures) if (file := objective_file(text)) is not None]
     return {path: digest_of(Path(path)) for path in paths}
-
-
-def digest_of(path: Path) -> str:
-    """Return the SHA-256 of a file.
-
-    Raises
-    ------
-    InputError
-        It cannot be read.
-    """
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-
-
-def code_version() -> dict[str, str]:
-    """Return what a result depends on besides its inputs: this package's sources, and the solvers'."""
-    from bcut.scip.host import scip_version
-
-    return {
-        "bcut": bcut.__version__,
-        "sources": sources_digest(),
-        "scip": scip_version(),
-        "pyscipopt": importlib.metadata.version("pyscipopt"),
-        "highs": importlib.metadata.version("highspy"),
-        "numpy": importlib.metadata.version("numpy"),
-    }
-
-
-def sources_digest() -> str:
-    """Return the SHA-256 of all sources that a run executes, the separators included."""
-    folder = Path(os.path.dirname(bcut.__file__))
-    files = {
-        path.relative_to(folder).as_posix(): path
-        for path in folder.rglob("*.py")
-        if path.relative_to(folder).parts[0] not in _ASIDE
-    }
-    files |= {f"experiments/{name}": folder / "experiments" / name for name in _AT_WORK}
-    separators = importlib.import_module("bcut.separators")
-    for place in separators.__path__:
-        files |= {f"separators/{path.name}": path for path in Path(place).glob("*.py")}
-    digest = hashlib.sha256()
-    for name in sorted(files):
-        digest.update(f"{name}\0".encode() + hashlib.sha256(files[name].read_bytes()).digest())
-    return digest.hexdigest()
-
-
-def machine() -> dict[str, Any]:
-    """Describe the machine, without its name."""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "system": f"{platform.system()} {platform.machine()}",
-        "python": platform.python_version(),
-    }
-
-
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or "unknown"

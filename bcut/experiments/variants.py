@@ -9,6 +9,7 @@ from typing import Any
 from bcut.errors import BcutError
 from bcut.experiments.cases import Case, checked_objective, sense_of, with_absolute_path
 from bcut.experiments.reading import Table
+from bcut.experiments.scip_names import DEFAULT, UNLIMITED
 from bcut.separation.resolve import Specification, resolve
 
 PRESETS = {
@@ -27,7 +28,6 @@ _METHODS = {
     "loop": ("listing", "orbits", "fixing"),
     "solve": ("auto", "listing", "orbits", "fixing", "elimination", "scip"),
 }
-_UNLIMITED = ":unlimited"
 _WITHOUT_SEPARATORS = {
     "plain": "it is SCIP alone",
     "sizes": "it solves nothing",
@@ -194,8 +194,8 @@ def _absolute(text: str, folder: Path) -> str:
 
 def _scip(table: Table, preset: str) -> tuple[str, ...]:
     value = table.entries.get("scip", [])
-    if value == "default":
-        value = ["default"]
+    if value == DEFAULT:
+        value = [DEFAULT]
     elif value == "off":
         value = []
     if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
@@ -204,22 +204,15 @@ def _scip(table: Table, preset: str) -> tuple[str, ...]:
         )
     if value and preset != "root":
         table.refuse("scip", f"names separators of SCIP, which is for preset 'root' only, not '{preset}'")
-    if value and value != ["default"]:
+    if value and value != [DEFAULT]:
         from bcut.scip.host import scip_separators
 
         known = scip_separators()
         for entry in value:
-            name = entry.removesuffix(_UNLIMITED)
+            name = entry.removesuffix(UNLIMITED)
             if name not in known:
                 table.refuse("scip", f"names '{name}', but SCIP's separators are {', '.join(known)}")
     return tuple(value)
-
-
-def named(scip: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Split names of SCIP's separators into those with their usual limits, and those without."""
-    limited = tuple(name for name in scip if not name.endswith(_UNLIMITED) and name != "default")
-    unlimited = tuple(name.removesuffix(_UNLIMITED) for name in scip if name.endswith(_UNLIMITED))
-    return limited, unlimited
 
 
 def _method(table: Table, preset: str) -> str:

@@ -1,4 +1,4 @@
-"""What separators are checked on: small configurations with all their triangulations, and points."""
+"""What separators are checked on: small configurations with all their triangulations or dissections, and points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.families import build
+from bcut.formulations.chambers import chamber_formulation
 from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.geometry.dissections import dissections
 from bcut.geometry.triangulations import triangulations
 from bcut.separation.seam import Problem
 
@@ -23,22 +25,25 @@ Point = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CaseName:
-    """Which problem: a family's member, only its spanning triangulations or all, on all columns or on some.
+    """Which problem: a family's member, only its spanning solutions or all, on all columns or on some.
 
-    With ``thinned`` the problem has only the columns of a few of the triangulations, as after fixing by
-    reduced costs.
+    With ``thinned`` the problem has only the columns of a few of the solutions, as after fixing by reduced
+    costs. With ``dissection`` it is about dissections, in the form of the chambers; such cases concern families
+    that declare ``dissections = True``.
     """
 
     instance: str
     spanning: bool = False
     thinned: bool = False
+    dissection: bool = False
 
     def __str__(self) -> str:
-        notes = [note for note, given in (("spanning", self.spanning), ("thinned", self.thinned)) if given]
+        notes = [note for note in ("dissection", "spanning", "thinned") if getattr(self, note)]
         return f"{self.instance} ({', '.join(notes)})" if notes else self.instance
 
 
-#: In general position and not, spanning and not, dimensions 2 to 5; many have fractional vertices.
+#: In general position and not, spanning and not, dimensions 2 to 5; many have fractional vertices. Those with
+#: dissections are all in degenerate position, where these are more than the triangulations.
 CASES = (
     CaseName("hypersimplex:3,1"),
     CaseName("cube:2"),
@@ -66,20 +71,28 @@ CASES = (
     CaseName("cyclic:9,4"),
     CaseName("random:9,4,seed=3"),
     CaseName("cyclic:8,5"),
+    CaseName("polygon:6,center", dissection=True),
+    CaseName("grid:3,3", dissection=True),
+    CaseName("grid:3,3", dissection=True, thinned=True),
+    CaseName("cross-polytope:3", dissection=True),
+    CaseName("cube:3", dissection=True),
+    CaseName("antiprism:4", dissection=True, spanning=True),
+    CaseName("cross-polytope:4", dissection=True),
+    CaseName("simplex-product:2,2", dissection=True),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A small problem with all its triangulations.
+    """A small problem with all its solutions: triangulations, or dissections where the name says so.
 
     Attributes
     ----------
     name : CaseName
     problem : Problem
-        Formulation 2.
+        Formulation 2; for dissections that of the chambers.
     incidence : ndarray of float32, shape (m, T)
-        Column t is the 0/1 point of triangulation t.
+        Column t is the 0/1 point of solution t.
     """
 
     name: CaseName
@@ -87,15 +100,15 @@ class Case:
     incidence: NDArray[np.float32]
 
     def left_sides(self, cut: IntegerCut) -> NDArray[np.int64]:
-        """Return the left-hand side of a cut for each triangulation, exactly, shape (T,)."""
+        """Return the left-hand side of a cut for each solution, exactly, shape (T,)."""
         rows = self.incidence[cut.columns]
         if np.abs(cut.coefficients).sum() < 1 << 23:
             # Sums of integers this small are exact in single precision, and a product of floats is fast.
             return (cut.coefficients.astype(np.float32) @ rows).astype(np.int64)
         return cut.coefficients @ rows.astype(np.int64)
 
-    def triangulation(self, number: int) -> list[list[int]]:
-        """Return the simplices of a triangulation as lists of vertices."""
+    def solution(self, number: int) -> list[list[int]]:
+        """Return the simplices of a solution as lists of vertices."""
         return self.problem.simplices[np.flatnonzero(self.incidence[:, number])].tolist()
 
     @cached_property
@@ -132,7 +145,7 @@ class Case:
 
         Random costs seldom lead to a fractional vertex of a problem this small. The negative sum over a
         chordless odd cycle of the crossing graph often does: half of each of its simplices is more than any
-        triangulation has.
+        solution has.
         """
         random = np.random.default_rng(0)
         count = len(self.problem.simplices)
@@ -172,9 +185,8 @@ class Case:
     def other_points(self) -> Iterator[Point]:
         """Yield points that no linear program gave.
 
-        Nothing at all, a triangulation, mixtures of triangulations (which violate no valid cut), and points
-        far outside the relaxation: half of each simplex in a random set, random values, and all of
-        everything.
+        Nothing at all, a solution, mixtures of solutions (which violate no valid cut), and points far outside
+        the relaxation: half of each simplex in a random set, random values, and all of everything.
         """
         random = np.random.default_rng(1)
         count, total = self.incidence.shape
@@ -193,11 +205,16 @@ class Case:
 @lru_cache(maxsize=64)
 def case(name: CaseName) -> Case:
     """Build a case; it is kept for the next separator of the same process."""
-    formulation = cocircuit_formulation(build(name.instance), spanning=name.spanning)
-    listed = list(triangulations(formulation.chirotope, spanning=name.spanning))
+    configuration = build(name.instance)
+    if name.dissection:
+        formulation = chamber_formulation(configuration, spanning=name.spanning, dissection=True)
+        listed = list(dissections(formulation.chirotope, spanning=name.spanning))
+    else:
+        formulation = cocircuit_formulation(configuration, spanning=name.spanning)
+        listed = list(triangulations(formulation.chirotope, spanning=name.spanning))
     incidence = np.zeros((len(formulation.simplices), len(listed)), dtype=np.float32)
-    for number, triangulation in enumerate(listed):
-        incidence[list(triangulation), number] = 1
+    for number, solution in enumerate(listed):
+        incidence[list(solution), number] = 1
     if name.thinned:
         few = incidence[:, :: max(1, len(listed) // 12)]
         columns = np.flatnonzero(few.any(axis=1))

@@ -1,9 +1,10 @@
 """The contract that every separator keeps, as a suite of checks; its heart is validity.
 
 A separator is set up on small configurations, shown points of their relaxations and others, and every cut
-that it yields is compared with *every* triangulation, in integer arithmetic. Points are vertices of the
-relaxation, before and after the separator's own cuts, the same with noise, mixtures of triangulations, and
-points far outside: a valid cut is valid wherever it was found.
+that it yields is compared with *every* triangulation, in integer arithmetic. A family that declares its cuts
+valid for dissections is shown problems about these as well, and its cuts there are compared with every one of
+them. Points are vertices of the relaxation, before and after the separator's own cuts, the same with noise,
+mixtures of solutions, and points far outside: a valid cut is valid wherever it was found.
 """
 
 from __future__ import annotations
@@ -36,34 +37,39 @@ RULES = {
     "read-only": "it leaves the point as it is",
     "deterministic": "the same points give the same cuts",
     "valid": "no cut cuts off a triangulation",
+    "dissections": "no cut cuts off a dissection, as it declares",
 }
 
 
 @dataclass(frozen=True)
 class InvalidCut:
-    """A cut that a triangulation violates.
+    """A cut that a triangulation violates, or a dissection.
 
     Attributes
     ----------
     instance : str
     cut : str
         The inequality, written out with vertices.
-    triangulation : list of list of int
-        Its simplices.
+    solution : list of list of int
+        The simplices of the triangulation or dissection.
+    dissection : bool
+        Whether dissections were asked for.
     left, rhs : int
-        Left-hand side of the cut for the triangulation, and its right-hand side.
+        Left-hand side of the cut for the solution, and its right-hand side.
     """
 
     instance: str
     cut: str
-    triangulation: list[list[int]]
+    solution: list[list[int]]
+    dissection: bool
     left: int
     rhs: int
 
     def __str__(self) -> str:
-        simplices = " ".join(str(simplex) for simplex in self.triangulation)
+        simplices = " ".join(str(simplex) for simplex in self.solution)
+        kind = "dissection" if self.dissection else "triangulation"
         return (
-            f"{self.instance}: the cut {self.cut} cuts off a triangulation, "
+            f"{self.instance}: the cut {self.cut} cuts off a {kind}, "
             f"for which the left side is {self.left}: {simplices}"
         )
 
@@ -87,10 +93,12 @@ class CheckReport:
         The name of the family.
     failures : list of Failure
     configurations, triangulations, points : int
-        How many there were.
+        How many there were; where a configuration has several cases, it counts for each.
+    dissections : int or None
+        How many there were; None for a family that does not declare its cuts valid for them.
     cuts, violated : int
-        Cuts that were compared with all triangulations of their configuration, each once; and how many of
-        them were violated at the point at which they were found.
+        Cuts that were compared with all triangulations, or dissections, of their configuration, each once; and
+        how many of them were violated at the point at which they were found.
     seconds : float
     """
 
@@ -98,6 +106,7 @@ class CheckReport:
     failures: list[Failure] = field(default_factory=list)
     configurations: int = 0
     triangulations: int = 0
+    dissections: int | None = None
     points: int = 0
     cuts: int = 0
     violated: int = 0
@@ -110,7 +119,7 @@ class CheckReport:
 
     @property
     def invalid_cuts(self) -> list[InvalidCut]:
-        """The cuts that cut off a triangulation."""
+        """The cuts that cut off a triangulation or a dissection."""
         return [failure.invalid for failure in self.failures if failure.invalid]
 
     @property
@@ -118,14 +127,22 @@ class CheckReport:
         """The report as lines of text."""
         broken = {failure.rule for failure in self.failures}
         lines = [f"separator '{self.separator}': {'passed' if self.ok else 'FAILED'}"]
-        lines += [f"  {'FAILED' if rule in broken else 'ok':6}  {text}" for rule, text in RULES.items()]
+        for rule, text in RULES.items():
+            if rule != "dissections" or self.dissections:
+                lines.append(f"  {'FAILED' if rule in broken else 'ok':6}  {text}")
+        solutions = f"{self.triangulations} triangulations"
+        if self.dissections is not None:
+            solutions += f" and {self.dissections} dissections"
         lines.append(
             f"  {self.cuts} cuts ({self.violated} violated where they were found) at {self.points} points of "
-            f"{self.configurations} configurations, against {self.triangulations} triangulations, "
-            f"{self.seconds:.1f} s"
+            f"{self.configurations} configurations, against {solutions}, {self.seconds:.1f} s"
         )
         if self.ok and not self.violated:
             lines.append("  No cut was violated anywhere: validity was hardly put to the test.")
+        if self.ok and self.dissections == 0:
+            lines.append(
+                "  No case had dissections: that cuts are valid for them, as declared, was not tested."
+            )
         for failure in self.failures:
             lines += ["", f"{failure.rule}: {failure.text}"]
         return "\n".join(lines)
@@ -139,7 +156,7 @@ def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = C
     make : callable
         Makes a new separator, such as ``MyCuts`` or ``lambda: resolve("./my_cuts.py:depth=3")``.
     cases : sequence of CaseName, optional
-        On which configurations.
+        On which configurations. Those about dissections are left out where the family is not for dissections.
 
     Returns
     -------
@@ -154,12 +171,20 @@ def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = C
     first = make()
     report = CheckReport(str(first.name) or type(first).__name__)
     _check_declaration(first, report)
+    if first.dissections:
+        report.dissections = 0
     for name in cases:
         if len(report.failures) >= _ENOUGH_FAILURES:
             break
+        if name.dissection and report.dissections is None:
+            continue
         small = case(name)
         report.configurations += 1
-        report.triangulations += small.incidence.shape[1]
+        solutions = small.incidence.shape[1]
+        if name.dissection:
+            report.dissections = (report.dissections or 0) + solutions
+        else:
+            report.triangulations += solutions
         _CaseCheck(small, make, report).run()
     report.seconds = time.perf_counter() - started
     return report
@@ -272,11 +297,12 @@ class _CaseCheck:
             invalid = InvalidCut(
                 str(self.case.name),
                 _written(cut, self.case),
-                self.case.triangulation(worst),
+                self.case.solution(worst),
+                self.case.name.dissection,
                 int(left_sides[worst]),
                 cut.rhs,
             )
-            raise _BrokenRuleError("valid", str(invalid), invalid)
+            raise _BrokenRuleError("dissections" if invalid.dissection else "valid", str(invalid), invalid)
 
 
 def _contents(point: FractionalPoint) -> dict[str, bytes]:

@@ -10,7 +10,7 @@ from bcut.separation.observer import CutObserver
 from bcut.solving.groups import GroupLike
 from bcut.solving.options import InstanceLike, Options, SeparatorLike
 from bcut.solving.run import Run
-from bcut.solving.search import Progress, place
+from bcut.solving.search import Progress
 
 
 def solve(
@@ -125,11 +125,9 @@ def solve(
         invariant_under=invariant_under,
     )
     run = Run(instance, options, on_progress)
-    search = run.search
-    search.cut_observer = cut_observer
+    run.search.cut_observer = cut_observer
     run.within_limits(run.solve)
-    if search.columns is None and search.status != "infeasible" and run.subgroups is None:
-        place(search)
+    run.hand_out()
     return run.finish()
 
 

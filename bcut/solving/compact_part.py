@@ -17,7 +17,7 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.delaunay import first_triangulation
 from bcut.geometry.flips import anneal_by_flips, improve_by_flips
 from bcut.geometry.partial_chirotope import PartialChirotope
-from bcut.objectives.objective import Candidates, Objective, objective_of
+from bcut.objectives.objective import Bottleneck, Candidates, Objective, objective_of
 from bcut.objectives.syntax import ObjectiveName
 from bcut.solving.memory import used_memory
 from bcut.solving.search import Part, Search
@@ -78,6 +78,14 @@ def _without_rows(
         upper=none,
         row_faces=(),
     )
+
+
+def without_columns(configuration: PointConfiguration, name: ObjectiveName, *, spanning: bool) -> Part:
+    """Return a part without any column: what a search knows before simplices are listed."""
+    none = np.empty((0, configuration.dimension + 1), dtype=np.int64)
+    formulation = _without_rows(configuration, PartialChirotope(configuration, ()), none, spanning)
+    kind = Bottleneck if name.is_bottleneck else Objective
+    return Part.whole(formulation, kind(name.text, name.sense, np.empty(0, dtype=np.int64)))
 
 
 def begin_fixing(configuration: PointConfiguration, name: ObjectiveName, *, spanning: bool) -> Part:

@@ -105,7 +105,7 @@ def proven_bound(search: Search) -> Fraction | None:
     """Return the bound on the objective, rounded to a value that it can have."""
     if search.bound is None:
         return None
-    return search.sign * search.whole.objective.rounded_up(search.bound)
+    return search.sign * search.rounded_up(search.bound)
 
 
 def as_number(value: Fraction | None) -> int | float | None:

@@ -16,7 +16,7 @@ from bcut.instance import load_instance
 from bcut.objectives.invariance import symmetries_of_table
 from bcut.objectives.measures import read_costs
 from bcut.objectives.objective import objective_of
-from bcut.objectives.syntax import ObjectiveName, read_level, read_objective
+from bcut.objectives.syntax import read_level, read_objective
 from bcut.result import Certificate, Question, Result
 from bcut.separation.driver import check_names
 from bcut.separation.resolve import resolve
@@ -26,7 +26,7 @@ from bcut.solving.by_elimination import empty_part, solve_by_elimination
 from bcut.solving.by_fixing import bound_by_fixing, solve_by_fixing
 from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
 from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
-from bcut.solving.compact_part import begin_fixing, make_program
+from bcut.solving.compact_part import begin_fixing, make_program, without_columns
 from bcut.solving.embedding import costs_to_embed
 from bcut.solving.groups import subgroups_to_try, symmetries_of
 from bcut.solving.levels import Levels, solve_listed
@@ -43,7 +43,7 @@ from bcut.solving.options import (
 from bcut.solving.orbit_stage import OrbitStage, orbit_stage
 from bcut.solving.programs import formulation_name, make_formulation
 from bcut.solving.report import make_result
-from bcut.solving.search import Part, Progress, Search, bound_at_root
+from bcut.solving.search import Part, Progress, Search, bound_at_root, place
 from bcut.solving.strategies import solve_in_scip
 
 
@@ -68,7 +68,7 @@ class Run:
         options.check()
         self.formulation = formulation_name(options.formulation, dissection=options.dissection)
         self.name = read_objective(options.objective, options.sense)
-        following = [read_level(text) for text in options.then]
+        self.following = [read_level(text) for text in options.then]
         given = options.separators
         if given is None:
             given = _default_separators(self.formulation, options.dissection)
@@ -83,23 +83,25 @@ class Run:
             self.configuration, require=options.require, forbid=options.forbid, star=options.star
         )
         self.link, self.only_link = self._link()
-        self.method = self._method(following)
-        self.stage = self._orbits()
+        self.method = self._method()
+        self.group = self._group()
         self.subgroups: list[PermutationGroup] | None = None
-        if self.stage is not None and options.invariant_under is not None:
+        if self.group is not None and options.invariant_under is not None:
             self.subgroups = subgroups_to_try(
-                self.configuration, self.stage.group, options.invariant_under, seed=options.seed
+                self.configuration, self.group, options.invariant_under, seed=options.seed
             )
-        whole, self.size = self._whole(families)
+        self.families = families
+        self.size = (0, 0)
+        self.stage: OrbitStage | None = None
+        self.levels: Levels | None = None
         self.search = Search(
-            whole=whole,
+            whole=self._beginning(),
             make_separators=lambda: [_make(item) for item in self.separators],
             deadline=deadline,
             seed=options.seed,
             on_progress=on_progress,
             restricted=bool(self.restrictions),
         )
-        self.levels = Levels(self.search, following) if following else None
         self.search.seconds["model"] = time.perf_counter() - started
         self.question = self._question()
 
@@ -108,28 +110,28 @@ class Run:
         families = {_describe(item).split(":")[0] for item in self.separators}
         return "link" in families, families <= {"link"}
 
-    def _method(self, following: Sequence[ObjectiveName]) -> str:
+    def _method(self) -> str:
         """Return the method, chosen or checked."""
         options, method = self.options, self.options.method
         if options.symmetries is not None or options.invariant_under is not None:
             if method not in ("auto", "orbits"):
                 raise InputError(f"method '{method}' does not work with symmetries; use the method orbits")
             method = "orbits"
-        check_method(method, self.name, following)
+        check_method(method, self.name, self.following)
         traits = Traits(
             self.configuration,
             self.name,
             spanning=options.spanning,
             whole_question=self.formulation == "2" and not self.restrictions,
             only_link=self.only_link,
-            following=bool(following),
+            following=bool(self.following),
             symmetries=lambda: symmetry_group(self.configuration).order,
             only_bound=options.only_bound,
         )
         return choose_method(method, traits)
 
-    def _orbits(self) -> OrbitStage | None:
-        """Return the stage over orbits where that is the method."""
+    def _group(self) -> PermutationGroup | None:
+        """Return the symmetries to work with where orbits are the method."""
         if self.method != "orbits":
             return None
         options = self.options
@@ -137,36 +139,51 @@ class Run:
         if options.objective != "cardinality":
             default, table = read_costs(Path(options.objective.partition(":")[2]), self.configuration)
             group = symmetries_of_table(group, default, table)
+        return group
+
+    def _beginning(self) -> Part:
+        """Return what is known before limits are watched: at most a triangulation that takes no search."""
+        if self.method == "fixing":
+            return begin_fixing(self.configuration, self.name, spanning=self.options.spanning)
+        if self.method == "elimination":
+            return empty_part(self.configuration)
+        return without_columns(self.configuration, self.name, spanning=self.options.spanning)
+
+    def _make_model(self) -> None:
+        """List simplices or their orbits, and write down the program that the search is about."""
+        search, options = self.search, self.options
+        if self.method == "fixing":
+            self.size = make_program(search, self.name, only_link=self.only_link)
+        elif self.group is not None:
+            with search.timed("model"):
+                self.stage = self._orbits(self.group)
+                formulation = self.stage.formulation
+                self.size = int(formulation.sizes.sum()), formulation.matrix.shape[0] + 1
+                search.whole, search.unit = known_triangulation(self.stage), self.stage.objective.unit
+        elif self.method != "elimination":
+            with search.timed("model"):
+                listed = make_formulation(
+                    self.formulation,
+                    self.configuration,
+                    spanning=options.spanning,
+                    dissection=options.dissection,
+                    restrictions=self.restrictions,
+                )
+                if listed.dissection and not listed.chirotope.is_general:
+                    _check_valid_for_dissections(self.families)
+                self.size = listed.size
+                search.whole = Part.whole(listed, objective_of(self.name, listed))
+                self.levels = Levels(search, self.following) if self.following else None
+
+    def _orbits(self, group: PermutationGroup) -> OrbitStage:
         return orbit_stage(
             self.configuration,
-            options.objective,
+            self.options.objective,
             sense=self.name.sense,
-            spanning=options.spanning,
+            spanning=self.options.spanning,
             group=group,
-            seconds=options.time_limit,
+            seconds=self.search.seconds_left,
         )
-
-    def _whole(self, families: Sequence[Separator]) -> tuple[Part, tuple[int, int]]:
-        """Return the whole program as far as it is made before limits are watched, and its size."""
-        options = self.options
-        if self.method == "fixing":
-            return begin_fixing(self.configuration, self.name, spanning=options.spanning), (0, 0)
-        if self.method == "elimination":
-            return empty_part(self.configuration), (0, 0)
-        if self.stage is not None:
-            formulation = self.stage.formulation
-            size = (int(formulation.sizes.sum()), formulation.matrix.shape[0] + 1)
-            return known_triangulation(self.stage), size
-        listed = make_formulation(
-            self.formulation,
-            self.configuration,
-            spanning=options.spanning,
-            dissection=options.dissection,
-            restrictions=self.restrictions,
-        )
-        if listed.dissection and not listed.chirotope.is_general:
-            _check_valid_for_dissections(families)
-        return Part.whole(listed, objective_of(self.name, listed)), listed.size
 
     def _question(self) -> Question:
         """Return what was asked, as it stands in the result file."""
@@ -206,6 +223,7 @@ class Run:
 
     def solve(self) -> None:
         """Search for an optimum."""
+        self._make_model()
         if self.stage is not None:
             if self.subgroups is None:
                 solve_by_orbits(self.search, self.stage, cuts=self.link)
@@ -214,7 +232,6 @@ class Run:
         elif self.method == "scip":
             solve_in_scip(self.search)
         elif self.method == "fixing":
-            self.size = make_program(self.search, self.name, only_link=self.only_link)
             solve_by_fixing(self.search)
         elif self.method == "elimination":
             self.size = solve_by_elimination(self.search).size
@@ -226,12 +243,12 @@ class Run:
     def bound(self) -> None:
         """Bound at the root only."""
         search = self.search
+        self._make_model()
         if self.stage is not None:
             bound_by_orbits(search, self.stage, cuts=self.link)
             search.status = "limit" if search.bound is None else "bound"
             return
         if self.method == "fixing":
-            self.size = make_program(search, self.name, only_link=self.only_link)
             bound_by_fixing(search)
             return
         if self.name.is_bottleneck:
@@ -246,9 +263,23 @@ class Run:
         if root.status == "limit":
             search.status = "limit"
 
+    def hand_out(self) -> None:
+        """Have some triangulation where the search has none: it costs next to nothing."""
+        search = self.search
+        if search.columns is not None or search.status == "infeasible" or self.subgroups is not None:
+            return
+        if len(search.whole.columns) or self.restrictions:
+            place(search)
+            return
+        # Before the simplices were listed.
+        search.whole = begin_fixing(self.configuration, self.name, spanning=self.options.spanning)
+        search.offer(search.whole.columns)
+
     def finish(self) -> Result:
         """Verify what was found and write it down."""
         certificate = self.certificate()
+        if self.levels is None and self.following:
+            self.levels = Levels(self.search, self.following)
         if self.levels is not None:
             self.levels.conclude()
         self.question.costs = costs_to_embed(

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
+from math import ceil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,7 +71,11 @@ class Search:
     columns : ndarray of int or None
         The best triangulation found.
     bound : Fraction or None
-        Proven bound on ``sign * objective``.
+        Bound on ``sign * objective``. What of it is proven exactly stands in the certificate; it may go beyond that
+        where a solver says that a relaxation has no point, or that its tree is finished.
+    unit : Fraction or None
+        Every value is an integral multiple of it; None where the costs of the whole tell. Where the whole has a part
+        of the candidates only, these may have a larger common divisor.
     restricted : bool
         Whether there may be no solution at all.
     exact : SafeBound or None
@@ -90,6 +95,7 @@ class Search:
     status: Status = "limit"
     columns: NDArray[np.intp] | None = None
     bound: Fraction | None = None
+    unit: Fraction | None = None
     restricted: bool = False
     exact: SafeBound | None = None
     refutation: tuple[Fraction, tuple[Stage, ...]] | None = None
@@ -125,9 +131,15 @@ class Search:
             self.columns = columns
 
     def raise_bound(self, bound: Fraction) -> None:
-        """Keep a proven bound on ``sign * objective`` if it is the best so far."""
+        """Keep a bound on ``sign * objective`` if it is the best so far."""
         if self.bound is None or bound > self.bound:
             self.bound = bound
+
+    def rounded_up(self, bound: Fraction) -> Fraction:
+        """Round a bound on ``sign * objective`` up to the next value that a triangulation can have."""
+        if self.unit is None:
+            return self.whole.objective.rounded_up(bound)
+        return ceil(bound / self.unit) * self.unit
 
     def report(self, stage: str, **facts: Any) -> None:
         """Tell whoever watches how far the solve is."""

@@ -28,7 +28,7 @@ from bcut.errors import VerificationError
 from bcut.verification.certificate_data import CertificateData, CertifiedBound
 from bcut.verification.certificate_program import CertificateProgram
 from bcut.verification.costs import Costs
-from bcut.verification.cuts import CUT_CHECKERS, Candidates
+from bcut.verification.cuts import CUT_CHECKERS, Candidates, UncheckedError
 from bcut.verification.exact_points import ExactPoints, SideTable, Simplex
 from bcut.verification.restrictions import RestrictionData
 
@@ -185,4 +185,6 @@ def check_cuts(sides: SideTable, certificate: CertificateData) -> str:
             CUT_CHECKERS[cut.family](sides, cut)
         except VerificationError as error:
             raise VerificationError(f"{where} is not valid: {error}") from None
+        except UncheckedError as error:
+            return f"{where}: {error}"
     return ""

@@ -9,10 +9,17 @@ from fractions import Fraction
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
+from bcut.errors import BcutError
 from bcut.verification.exact_points import ExactPoints, SideTable, Simplex, mask_of, without
 
 if TYPE_CHECKING:
     from bcut.verification.restrictions import RestrictionData
+
+
+class UncheckedError(BcutError):
+    """A cut that takes too long to check: nothing is known of it, so it is neither refused nor believed."""
+
+    exit_status = 3
 
 
 @dataclass(frozen=True)

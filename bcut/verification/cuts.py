@@ -2,8 +2,9 @@
 
 A checker is shown exact sides, with the candidate simplices where those are restricted (`Candidates`), and a cut. It
 returns the right-hand side that follows from the proof, and raises `VerificationError` where that is more than the
-cut's: then some triangulation may violate it. It shares nothing with the separator that made the cut. To have the cuts
-of another family re-checked, write such a function and register it.
+cut's: then some triangulation may violate it. Where that cannot be told within reasonable time, it raises
+`UncheckedError`. It shares nothing with the separator that made the cut. To have the cuts of another family re-checked,
+write such a function and register it.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from bcut.verification.crossing_cuts import check_clique, check_odd_cycle
-from bcut.verification.cut_data import Candidates, CertificateCut, cross
+from bcut.verification.cut_data import Candidates, CertificateCut, UncheckedError, cross
 from bcut.verification.exact_points import SideTable
 from bcut.verification.face_cuts import check_face_crossing
 from bcut.verification.link_cuts import check_link
@@ -32,7 +33,16 @@ CUT_CHECKERS: dict[str, Checker] = {
     "sphere": check_sphere,
 }
 
-__all__ = ["CUT_CHECKERS", "Candidates", "CertificateCut", "Checker", "check_clique", "cross", "cut_checker"]
+__all__ = [
+    "CUT_CHECKERS",
+    "Candidates",
+    "CertificateCut",
+    "Checker",
+    "UncheckedError",
+    "check_clique",
+    "cross",
+    "cut_checker",
+]
 
 
 def cut_checker(family: str) -> Callable[[Checker], Checker]:

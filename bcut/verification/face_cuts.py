@@ -15,9 +15,9 @@ from math import floor
 from typing import Any
 
 from bcut.errors import VerificationError
-from bcut.verification.crossing_cuts import exceeds
 from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of, covers
 from bcut.verification.exact_points import SideTable, Simplex
+from bcut.verification.heavy_sets import HeavySets
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,8 @@ def check_face_crossing(sides: SideTable, cut: CertificateCut) -> Fraction:
     ------
     VerificationError
         The proof lacks something or does not hold, or less follows than the cut says.
+    UncheckedError
+        The weights take too long to check.
     """
     candidates = candidates_of(sides)
     nodes, bound = _nodes(candidates, cut), _bound(cut)
@@ -76,20 +78,16 @@ def check_face_crossing(sides: SideTable, cut: CertificateCut) -> Fraction:
 
 def _check_weights(candidates: Candidates, nodes: Sequence[_Node], bound: int) -> None:
     """Check, one face after another, that those which do not cross weigh no more than the bound."""
-    crossed: list[int] = []
-    weights = [Fraction(node.weight) for node in nodes]
-    for position, node in enumerate(nodes):
-        own = 0
-        for before in range(position):
-            if candidates.faces_crossing(nodes[before].face, node.face, nodes[before].rest):
-                own |= 1 << before
-                crossed[before] |= 1 << position
-        crossed.append(own)
-        if exceeds(((1 << position) - 1) & ~own, crossed, weights, bound - weights[position]):
-            raise VerificationError(
-                f"face-crossing cut: with the weight {node.weight} of {list(node.face)}, faces that do not cross weigh "
-                f"more than {bound}"
-            )
+
+    def crossing(first: int, second: int) -> bool:
+        return candidates.faces_crossing(nodes[first].face, nodes[second].face, nodes[first].rest)
+
+    position = HeavySets([node.weight for node in nodes], crossing).first_excess(0, bound)
+    if position is not None:
+        raise VerificationError(
+            f"face-crossing cut: with the weight {nodes[position].weight} of {list(nodes[position].face)}, faces that "
+            f"do not cross weigh more than {bound}"
+        )
 
 
 def _bound(cut: CertificateCut) -> int:

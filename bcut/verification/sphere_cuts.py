@@ -19,10 +19,10 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from bcut.errors import VerificationError
-from bcut.verification.cut_data import Candidates, CertificateCut, candidates_of, covers
+from bcut.verification.cut_data import Candidates, CertificateCut, UncheckedError, candidates_of, covers
 from bcut.verification.exact_points import SideTable, Simplex, mask_of, without
 
-# A proof that takes more branches than this is refused.
+# A proof that takes more branches than this is not checked.
 _BRANCHES = 1_000_000
 
 
@@ -42,6 +42,8 @@ def check_sphere(sides: SideTable, cut: CertificateCut) -> Fraction:
     ------
     VerificationError
         The proof lacks something or does not hold, or less follows than the cut says.
+    UncheckedError
+        The proof takes too long to check.
     """
     candidates = candidates_of(sides)
     proof = _Proof.of(candidates, cut)
@@ -159,8 +161,8 @@ class _Search:
         for number in _bits(choices):
             self.branches += 1
             if self.branches > _BRANCHES:
-                raise VerificationError(
-                    f"sphere cut at {list(self.proof.face)}: its proof takes more than {_BRANCHES} branches"
+                raise UncheckedError(
+                    f"it takes more than {_BRANCHES:,} branches to check a sphere cut at {list(self.proof.face)}"
                 )
             heavier = weight + self.weights[number]
             if heavier >= self.proof.alpha:
