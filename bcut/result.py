@@ -5,17 +5,22 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bcut.files.atomic import write_text
+from bcut.records import Record, load_record
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
 
 SCHEMA = 1
 
 Status = Literal["optimal", "infeasible", "limit", "interrupted", "bound"]
 
 
-@dataclass
-class Instance:
+@dataclass(repr=False)
+class Instance(Record):
     """The point configuration, exact, so that a result can be run and verified again."""
 
     name: str
@@ -24,8 +29,8 @@ class Instance:
     digest: str
 
 
-@dataclass
-class LevelQuestion:
+@dataclass(repr=False)
+class LevelQuestion(Record):
     """A further objective of a lexicographic combination; attributes as in `Question`."""
 
     objective: str
@@ -33,8 +38,8 @@ class LevelQuestion:
     costs: dict[str, Any] | None = None
 
 
-@dataclass
-class Question:
+@dataclass(repr=False)
+class Question(Record):
     """What was asked: the entry ``problem`` of a result file.
 
     Where `invariant_under` is not None, only triangulations count that one of these groups, each given by generators,
@@ -58,8 +63,8 @@ class Question:
     star: int | None = None
 
 
-@dataclass
-class RoundRecord:
+@dataclass(repr=False)
+class RoundRecord(Record):
     """One root relaxation: its unrounded value, and the cuts then added, by family."""
 
     lp: float
@@ -67,8 +72,8 @@ class RoundRecord:
     stage: str
 
 
-@dataclass
-class Root:
+@dataclass(repr=False)
+class Root(Record):
     """The root bound: LP values, unrounded, before and after cuts, and whether the last LP point was integral."""
 
     lp: float | None = None
@@ -77,8 +82,8 @@ class Root:
     rounds: list[RoundRecord] = field(default_factory=list)
 
 
-@dataclass
-class Size:
+@dataclass(repr=False)
+class Size(Record):
     """Columns and rows of the formulation; columns that survived reduced-cost fixing."""
 
     columns: int = 0
@@ -86,8 +91,8 @@ class Size:
     columns_after_fixing: int | None = None
 
 
-@dataclass
-class Certificate:
+@dataclass(repr=False)
+class Certificate(Record):
     """Exact dual multipliers and the bound that they prove, or the reason why there are none.
 
     Attributes
@@ -123,6 +128,10 @@ class Certificate:
         symmetries that are left: those that take all faces chosen so far to themselves. For a cut, "group" counts the
         faces that matter.
     reason : str or None
+        Why there are no multipliers.
+    settles : {"exactly", "within 1e-9"} or None
+        Whether all this proves the status, as far as the run knows; `bcut verify` finds out. The second, where values
+        are no integers, means a relative gap; None that the status rests on more than the certificate.
     """
 
     bound: str | None = None
@@ -136,10 +145,11 @@ class Certificate:
     earlier: list[str] = field(default_factory=list)
     refutes: dict[str, Any] | None = None
     reason: str | None = None
+    settles: str | None = None
 
 
-@dataclass
-class LevelRecord:
+@dataclass(repr=False)
+class LevelRecord(Record):
     """What was found by a further objective of a lexicographic combination, among the best by those before it.
 
     Attributes are those of `Result`; status is None where it was not begun.
@@ -194,10 +204,33 @@ class Result:
     versions: dict[str, str] = field(default_factory=dict)
     schema: int = SCHEMA
 
+    def __repr__(self) -> str:
+        from bcut.summary import headline
+
+        return f"<Result {headline(self)}>"
+
+    def __str__(self) -> str:
+        from bcut.summary import summary
+
+        return summary(self).rstrip("\n")
+
     @property
     def optimal(self) -> bool:
         """Whether optimality was proven."""
         return self.status == "optimal"
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str] | Mapping[str, Any]) -> Result:
+        """Make a result of a result file, or of its data, as `to_dict` returns them.
+
+        Nothing is checked but the types of the entries; `bcut.verify` checks what they say.
+
+        Raises
+        ------
+        ResultError
+            It cannot be read, belongs to another schema, lacks an entry, has one of the wrong type or an unknown one.
+        """
+        return load_record(cls, source, schema=SCHEMA)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result file as plain data, in the documented order."""

@@ -26,7 +26,7 @@ from bcut.solving.certificates import make_certificate
 from bcut.verification.certificate import certified_bound
 from bcut.verification.certificate_data import CertificateData
 from bcut.verification.costs import Costs
-from bcut.verification.cuts import CertificateCut, check_clique, cross
+from bcut.verification.cuts import CUT_CHECKERS, CertificateCut, UncheckedError, check_clique, cross
 from bcut.verification.exact_points import ExactPoints, SideTable
 from bcut.verification.verify import verify
 
@@ -118,6 +118,38 @@ def test_bounds_are_not_rounded_where_costs_are_no_integers() -> None:
     assert not verification.proven_optimal
     with pytest.raises(VerificationError, match="'optimal', but its bound 3/4 leaves room"):
         verify({**data, "bound": "3/4", "gap": 0.25})
+
+
+def small_square(default: str, costs: list[Any], proven: str) -> dict[str, Any]:
+    """Two triangles of cost 1e-12 each, and the bound that the multiplier of the coverage row proves."""
+    data = square_result(bound=proven, multipliers=[["coverage", proven]])
+    table = {"default": default, "costs": costs}
+    value = "2/1000000000000"
+    data["problem"] = {**data["problem"], "objective": "costs:x", "costs": table}
+    return {**data, "value": value, "bound": value}
+
+
+def test_a_bound_that_is_half_of_a_small_value_does_not_make_it_optimal() -> None:
+    tiny = "1/1000000000000"
+    verification = verify(small_square(tiny, [], tiny))
+    assert verification.exact_bound == Fraction(tiny)
+    assert verification.statement == (
+        "triangulation verified, value 2e-12; bound 1e-12 proven exactly; optimality rests on the solver's tree"
+    )
+
+
+def test_the_statement_says_what_a_gap_is_relative_to() -> None:
+    tiny = "1/1000000000000"
+    used = [[[0, 1, 2], tiny], [[1, 2, 3], tiny]]
+    statement = verify(small_square("1/2", used, tiny)).statement
+    assert statement.endswith(
+        "bound 1e-12 proven exactly; so the value is optimal up to 2.0e-12 of the largest cost"
+    )
+    nearly = str(2 - Fraction(tiny))
+    data = square_result(bound=nearly, multipliers=[["coverage", nearly], [[0, 3], "1"], [[1, 2], "-1"]])
+    table = {"default": 1, "costs": [[[0, 1, 3], "3/2"]]}
+    data["problem"] = {**data["problem"], "objective": "costs:x", "costs": table}
+    assert verify(data).statement.endswith("so the value is optimal up to a relative gap of 5.0e-13")
 
 
 def test_weaker_claim_than_proven_is_improved() -> None:
@@ -368,6 +400,30 @@ def test_cuts_of_unknown_families_are_not_believed() -> None:
     assert verification.exact_bound is None
     assert not verification.proven_optimal
     assert "was not re-checked: it uses cuts that cannot be re-checked (magic)" in verification.statement
+
+
+def test_a_cut_that_takes_too_long_leaves_the_bound_unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
+    def tired(sides: SideTable, cut: CertificateCut) -> Fraction:
+        raise UncheckedError("it takes more than 5 steps")
+
+    monkeypatch.setitem(CUT_CHECKERS, "clique", tired)
+    verification = verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]])]))
+    assert (verification.exact_bound, verification.proven_optimal) == (None, False)
+    assert verification.statement == (
+        "triangulation verified, value 1; the bound of its certificate was not re-checked: "
+        "cut 0 of the certificate (clique): it takes more than 5 steps; optimality rests on the run itself"
+    )
+    # A target beyond the bound that rows alone prove is left open in the same way.
+    data = two_overlapping(bound="2")
+    stage = {"multipliers": [], "cuts": [clique([[0, 1, 2], [0, 1, 3]])]}
+    data["certificate"]["refutes"] = {"target": "2", "stages": [stage]}
+    verification = verify(data)
+    assert verification.exact_bound == 2
+    assert not verification.proven_optimal
+    assert (
+        "bound 2 proven exactly; what its certificate proves beyond that was not re-checked: stage 0 of the "
+        "certificate's refutation of 2: cut 0 of the certificate (clique): it takes more than 5 steps"
+    ) in verification.statement
 
 
 def test_cuts_without_multiplier_do_not_matter() -> None:

@@ -239,7 +239,7 @@ def test_the_summary_says_what_was_found(capsys: Captured, tmp_path: Path) -> No
     assert lines["root LP"].startswith("22.5, after cuts ")
     assert lines["value"] == "23"
     assert lines["bound"] == "23"
-    assert lines["status"] == "optimal (proven)"
+    assert lines["status"] == "optimal (proven exactly)"
     assert lines["separators"].startswith("link: ")
     assert lines["written"] == str(file)
     assert {"problem", "program", "nodes", "time"} <= set(lines)
@@ -265,9 +265,14 @@ def test_infeasible_is_solved(capsys: Captured, tmp_path: Path, monkeypatch: pyt
     """No configuration has no triangulation, but the summary and the status must be ready for later restrictions."""
     result = bcut.solve("cube:3")
     result.status, result.value, result.bound, result.triangulation = "infeasible", None, None, None
+    result.certificate.settles = None
+    result.certificate.reason = "that there is no triangulation rests on the solver's tree"
     monkeypatch.setattr("bcut.solving.api.solve", lambda *args, **options: result)
     assert run(["solve", "cube:3"]) == 0
-    assert "infeasible: there is no such triangulation (proven)" in capsys.readouterr().out
+    assert (
+        "infeasible: there is no such triangulation (that there is no triangulation rests on the solver's"
+        in (capsys.readouterr().out)
+    )
 
 
 def test_nothing_on_a_pipe_and_a_live_line_on_a_terminal() -> None:

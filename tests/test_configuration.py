@@ -141,7 +141,7 @@ def test_arrays_are_read_only_and_attributes_fixed() -> None:
         configuration.floats[0, 0] = 5
     with pytest.raises(AttributeError):
         configuration.name = "other"  # type: ignore[misc]
-    assert repr(configuration) == "<PointConfiguration 'square': 4 points in dimension 2>"
+    assert repr(configuration) == "<PointConfiguration square: 4 points in dimension 2>"
 
 
 def test_the_callers_array_is_not_shared() -> None:

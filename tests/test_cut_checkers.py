@@ -17,9 +17,10 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.simplices import candidate_simplices
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
-from bcut.verification.crossing_cuts import exceeds
-from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut
+from bcut.verification import heavy_sets, sphere_cuts
+from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut, UncheckedError
 from bcut.verification.exact_points import ExactPoints, SideTable
+from bcut.verification.heavy_sets import HeavySets
 
 Simplex = tuple[int, ...]
 
@@ -192,28 +193,79 @@ def test_an_odd_cycle_needs_its_proof(proof: dict[str, Any], says: str) -> None:
 
 @given(st.data())
 def test_the_search_for_heavy_sets_agrees_with_all_sets(data: st.DataObject) -> None:
-    size = data.draw(st.integers(1, 7))
-    pairs = list(combinations(range(size), 2))
-    crossing = {pair for pair in pairs if data.draw(st.booleans())}
-    crossed = [
-        sum(1 << other for other in range(size) if {(v, other), (other, v)} & crossing) for v in range(size)
-    ]
-    weights = [Fraction(data.draw(st.integers(0, 4)), 2) for _ in range(size)]
-    nodes = data.draw(st.integers(0, (1 << size) - 1))
-    heaviest = max(
-        sum((weights[v] for v in chosen), Fraction(0))
-        for k in range(size + 1)
-        for chosen in combinations([v for v in range(size) if nodes >> v & 1], k)
-        if not crossing & set(combinations(chosen, 2))
-    )
-    assert exceeds(nodes, crossed, weights, heaviest - Fraction(1, 2))
-    assert not exceeds(nodes, crossed, weights, heaviest)
+    size = data.draw(st.integers(1, 8))
+    crossing = {pair for pair in combinations(range(size), 2) if data.draw(st.booleans())}
+    weights = [Fraction(data.draw(st.integers(-1, 4)), data.draw(st.integers(1, 3))) for _ in range(size)]
+    start = data.draw(st.integers(0, size - 1))
+
+    def heaviest_with(last: int) -> Fraction:
+        """The largest weight of a set that has this node, and no later one."""
+        return max(
+            sum((weights[v] for v in chosen), weights[last])
+            for k in range(last + 1)
+            for chosen in combinations(range(last), k)
+            if not crossing & set(combinations((*chosen, last), 2))
+        )
+
+    by_last = [heaviest_with(last) for last in range(size)]
+    # The limits at which the answer changes, and some just below and above them.
+    limits = {max(Fraction(0), weight + step * Fraction(1, 12)) for weight in by_last for step in (-1, 0, 1)}
+    for limit in limits:
+        expected = next(
+            (v for v in range(start, size) if weights[v] > 0 and by_last[v] > limit),
+            None,
+        )
+        found = HeavySets(weights, lambda a, b: (a, b) in crossing).first_excess(start, limit)
+        assert found == expected
 
 
-def test_a_proof_that_would_keep_the_check_busy_is_refused() -> None:
-    # No two of sixty cross: all 2 ** 60 sets would be looked at.
-    with pytest.raises(VerificationError, match="a cut over 60 simplices or faces takes more than"):
-        exceeds((1 << 60) - 1, [0] * 60, [Fraction(1)] * 60, Fraction(60))
+def circles(count: int, *, length: int = 5) -> HeavySets:
+    """Separate cycles: no two neighbours in one of five is two nodes at most, but its cover by cliques has three."""
+
+    def crossing(first: int, second: int) -> bool:
+        return first // length == second // length and (second - first) % length in (1, length - 1)
+
+    return HeavySets([Fraction(1)] * (length * count), crossing)
+
+
+def test_what_a_cover_by_cliques_bounds_takes_no_steps() -> None:
+    # All 2 ** 60 sets of sixty nodes would be looked at otherwise.
+    alone = HeavySets([Fraction(1, 3)] * 60, lambda first, second: False)
+    assert alone.first_excess(0, 20) is None
+    assert alone.steps == 0
+    assert alone.first_excess(0, 19) == 57
+    triangles = circles(20, length=3)
+    assert triangles.first_excess(0, 20) is None
+    assert triangles.steps == 0
+    assert triangles.first_excess(0, Fraction(39, 2)) == 57
+
+
+def test_a_proof_that_would_keep_the_check_busy_is_not_called_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert circles(4).first_excess(0, 8) is None
+    assert circles(4).first_excess(0, 7) == 17
+    monkeypatch.setattr(heavy_sets, "_MOST_STEPS", 5000)
+    search = circles(20)
+    says = "more than 5,000 steps to check a cut over 100 simplices or faces"
+    with pytest.raises(UncheckedError, match=says) as caught:
+        search.first_excess(0, 40)
+    assert not isinstance(caught.value, VerificationError)
+    assert caught.value.exit_status == 3
+    # The steps of all nodes are counted together.
+    assert search.steps == 5001
+    with pytest.raises(UncheckedError):
+        search.first_excess(0, 40)
+
+
+def test_a_sphere_cut_that_takes_too_long_is_not_called_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = SMALL["space"]
+    star = [simplex for simplex in config.simplices if 0 in simplex]
+    proof = {"face": [0], "alpha": 1, "direction": list(star[0]), "light": [[list(s), 0] for s in star]}
+    asked = cut("sphere", {}, 0, proof)
+    with pytest.raises(VerificationError, match="but one weighs 0"):
+        CUT_CHECKERS["sphere"](config.sides, asked)
+    monkeypatch.setattr(sphere_cuts, "_BRANCHES", 2)
+    with pytest.raises(UncheckedError, match=r"more than 2 branches to check a sphere cut at \[0\]"):
+        CUT_CHECKERS["sphere"](config.sides, asked)
 
 
 def test_polygons_have_room_for_two_triangles_less_than_points() -> None:

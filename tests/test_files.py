@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import subprocess
+import sys
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,9 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bcut import instances
+from bcut.cli.main import run
 from bcut.errors import InputError
 from bcut.families import build
-from bcut.files import FORMATS, SUFFIXES, format_points, read_points, write_points
+from bcut.files import FORMATS, SUFFIXES, format_points, ply, read_points, write_points
+from bcut.files.surfaces import read_surface
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.numbers import AlgebraicNumber, parse_number
 from bcut.instance import load_instance
@@ -24,6 +29,9 @@ PLY_HEADER = (
     "ply\nformat {encoding} 1.0\nelement vertex 4\n"
     "property {kind} x\nproperty {kind} y\nproperty {kind} z\nend_header\n"
 )
+PLY = PLY_HEADER.format(encoding="ascii", kind="double")
+PLY_FACES = PLY.replace("end_header", "element face 1\nproperty list uchar int vertex_indices\nend_header")
+ROWS = ("0 0 0\n", "1 0 0\n", "0 1 0\n", "0 0 1\n")
 CLOUD = np.array([[0.1, 0.2, 0.7], [1, 0, 0], [0, 1.0 / 3, 0], [0, 0, 1e-5]])
 
 
@@ -167,26 +175,143 @@ def test_numpy_files(tmp_path: Path, kind: type) -> None:
 
 
 def test_off_files_keep_all_vertices_in_order(tmp_path: Path) -> None:
-    rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in CLOUD.tolist())
-    for name, text in {
-        "cloud.off": f"OFF\n4 0 0\n{rows}",
-        "mesh.OFF": f"# made by hand\nOFF\n4 1 0\n\n{rows}3 0 1 2\n",
-    }.items():
-        np.testing.assert_array_equal(read_points(written(tmp_path, name, text)).floats, CLOUD)
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in CLOUD.tolist()]
+    for head, behind, faces in (
+        ("OFF\n4 0 0\n", "", ""),
+        ("# made by hand\nOFF # the word\n4 1\n\n", "", "3 0 1 2\n"),
+        ("OFF 4 1 0\n", "  # a vertex", "3 0 1 2 255 0 0\n"),
+        ("COFF\n4 1 0\n", " 255 0 0 255", "4 0 1 2 3\n"),
+        ("STCNOFF\n4 0 0\n", " 0 0 1 1 0 0 0.5 0.5", ""),
+    ):
+        text = head + "".join(f"{row}{behind}\n" for row in rows) + faces
+        for kind, newline in (("off", "\n"), ("OFF", "\r\n")):
+            path = written(tmp_path, f"cloud.{kind}", text.replace("\n", newline))
+            np.testing.assert_array_equal(read_points(path).floats, CLOUD)
 
 
 def test_ply_files_keep_all_vertices_in_order(tmp_path: Path) -> None:
     rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in CLOUD.tolist())
-    text = PLY_HEADER.format(encoding="ascii", kind="double")
-    np.testing.assert_array_equal(read_points(written(tmp_path, "a.ply", text + rows)).floats, CLOUD)
-    faces = text.replace("end_header", "element face 1\nproperty list uchar int vertex_indices\nend_header")
-    np.testing.assert_array_equal(
-        read_points(written(tmp_path, "f.ply", f"{faces}{rows}3 0 1 2\n")).floats, CLOUD
-    )
+    np.testing.assert_array_equal(read_points(written(tmp_path, "a.ply", PLY + rows)).floats, CLOUD)
+    path = written(tmp_path, "f.ply", f"{PLY_FACES}{rows}3 0 1 2\n")
+    np.testing.assert_array_equal(read_points(path).floats, CLOUD)
     for kind, code in (("double", "<f8"), ("float", "<f4")):
         header = PLY_HEADER.format(encoding="binary_little_endian", kind=kind).encode()
         path = written(tmp_path, f"{kind}.ply", header + CLOUD.astype(code).tobytes())
         np.testing.assert_array_equal(read_points(path).floats, CLOUD.astype(code).astype(float))
+
+
+def test_ply_elements_stand_in_any_order_with_properties_of_all_kinds(tmp_path: Path) -> None:
+    header = (
+        "ply\nformat ascii 1.0\ncomment from Å\nelement face 2\nproperty uchar red\n"
+        "property list uchar int vertex_index\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n"
+        "element vertex 4\nproperty list uchar float weights\nproperty float z\nproperty float x\n"
+        "property float y\nend_header\n"
+    )
+    body = "7 3 0 1 2\n7 4 0 1 2 3\n0 1\n0 0 0 0\n2 0.5 0.5 1 2 3\n1 1 4 5 6\n0 7 8 10\n"
+    path = written(tmp_path, "a.ply", header + body)
+    assert read_points(path).floats.tolist() == [[0, 0, 0], [2, 3, 1], [5, 6, 4], [8, 10, 7]]
+    assert ply.read(path).faces == [[0, 1, 2], [0, 1, 2, 3]]
+    with pytest.raises(InputError, match=r"not all triangles \(face 1 has 4\)"):
+        read_surface(path)
+
+
+def test_quadrilaterals_in_binary_files_are_not_divided(tmp_path: Path) -> None:
+    header = PLY_FACES.replace("ascii", "binary_little_endian").encode()
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f8").tobytes()
+    for face in ([0, 1, 2], [0, 1, 2, 3]):
+        path = written(
+            tmp_path, "a.ply", header + points + bytes([len(face)]) + np.array(face, dtype="<i4").tobytes()
+        )
+        assert read_points(path).n == 4
+        if len(face) == 3:
+            assert read_surface(path)[1] == [face]
+        else:
+            with pytest.raises(InputError, match="not all triangles"):
+                read_surface(path)
+
+
+@pytest.mark.parametrize("kind", ["off", "ply"])
+def test_coordinates_of_meshes_are_what_their_texts_say(tmp_path: Path, kind: str) -> None:
+    head = {"off": "OFF\n4 0 0\n", "ply": PLY}[kind]
+    rows = "0 0 0\n1 0 0\n0 9007199254740993 0\n0.1 -.5e-2 +1E3\n"
+    configuration = read_points(written(tmp_path, f"a.{kind}", head + rows))
+    assert configuration.scalars()[2:] == ((0, 2**53 + 1, 0), (Fraction(0.1), Fraction(-0.005), 1000))
+
+
+def test_texts_are_read_without_the_library_for_meshes(tmp_path: Path) -> None:
+    paths = [
+        written(tmp_path, "a.off", f"OFF\n4 0 0\n{''.join(ROWS)}"),
+        written(tmp_path, "a.ply", PLY + "".join(ROWS)),
+    ]
+    code = (
+        "import sys, bcut.instance\n"
+        f"[bcut.instance.load_instance(path) for path in {[str(path) for path in paths]}]\n"
+        "sys.exit('trimesh' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("pattern", ["%r", "%.17g", "%.18e", "%.25f"])
+def test_doubles_written_as_texts_keep_their_digest(tmp_path: Path, pattern: str) -> None:
+    configuration = load_instance("random:20,3")
+    rows = [[pattern % value for value in row] for row in configuration.floats.tolist()]
+    counts = "OFF\n20 0 0\n"
+    for name, text in {
+        "a.csv": "".join(f"{','.join(row)}\n" for row in rows),
+        "a.off": counts + "".join(f"{' '.join(row)}\n" for row in rows),
+        "a.json": json.dumps(rows).replace('"', ""),
+        "texts.json": json.dumps(rows),
+    }.items():
+        assert read_points(written(tmp_path, name, text)).digest == configuration.digest
+
+
+@pytest.mark.parametrize("text", ["dodecahedron", "random:9,3,seed=4", "polygon:7"])
+def test_a_result_file_is_read_as_its_instance(tmp_path: Path, text: str) -> None:
+    configuration = load_instance(text)
+    instance = {
+        "name": text,
+        "dimension": configuration.dimension,
+        "points": configuration.exact_points(),
+        "digest": configuration.digest,
+    }
+    path = written(
+        tmp_path, "result.json", json.dumps({"schema": 1, "instance": instance, "status": "limit"})
+    )
+    again = load_instance(path)
+    assert (again.name, again.digest) == (text, configuration.digest)
+
+
+def test_results_of_solve_and_region_are_solved_again(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.json", tmp_path / "second.json"
+    assert run(["solve", "moae", "--quiet", "--output", str(first)]) == 0
+    assert run(["solve", str(first), "--quiet", "--output", str(second)]) == 0
+    old, new = json.loads(first.read_text()), json.loads(second.read_text())
+    assert (old["instance"], old["value"]) == (new["instance"], new["value"])
+    assert run(["region", "schoenhardt", "--output", str(first)]) == 0
+    assert run(["region", str(first), "--output", str(second)]) == 0
+    assert json.loads(first.read_text())["instance"] == json.loads(second.read_text())["instance"]
+    assert load_instance(first).n == 6
+
+
+def test_a_dash_is_standard_input_and_output(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["generate", "polygon:7", "--output", "-"]) == 0
+    text = capsys.readouterr().out
+    for content, status, message in (
+        (text, 0, ""),
+        ("\n", 2, "standard input: it is empty; it should hold points as JSON"),
+        ("0,0\n", 2, "standard input: line 1, column 2: not JSON"),
+        ("[[0, 0]]", 2, "standard input: 1 point"),
+        ("é", 2, "standard input: not UTF-8"),
+    ):
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content.encode("latin-1"))))
+        assert run(["generate", "-"]) == status
+        captured = capsys.readouterr()
+        assert captured.out == (text if status == 0 else "")
+        assert message in captured.err
+    assert list(tmp_path.iterdir()) == []
 
 
 BAD_FILES: list[tuple[str, str | bytes, str]] = [
@@ -198,7 +323,25 @@ BAD_FILES: list[tuple[str, str | bytes, str]] = [
     ("future.json", '{"schema": 2, "points": []}', "schema 2 is unknown"),
     ("name.json", '{"name": 5, "points": [[0,0],[1,0],[0,1]]}', '"name" must be a text'),
     ("nan.json", "[[0, 0], [1, NaN], [0, 1]]", "coordinate 1 of point 1 .* nan"),
-    ("infinite.json", "[[0, 0], [1, 1e999], [0, 1]]", "coordinate 1 of point 1 .* inf"),
+    ("infinite.json", "[[0, 0], [1, Infinity], [0, 1]]", "coordinate 1 of point 1 .* inf"),
+    ("large.json", "[[0, 0], [1, 1e999], [0, 1]]", "coordinate 1 of point 1 .*'1e999': .* beyond the range"),
+    (
+        "small.json",
+        '[[0, 0], ["1e-400", 1], [0, 1]]',
+        "coordinate 0 of point 1 .*'1e-400': .* become 0; write",
+    ),
+    (
+        "long.json",
+        "[[0.12345678901234567890123, 0], [1, 0], [0, 1]]",
+        "point 0 .* is 0.12345678901234568; write that",
+    ),
+    ("odd.csv", "0,0\n1,9007199254740993.0\n0,1\n", "line 2, column 2: .* is 9007199254740992.0; write that"),
+    ("undigested.json", '{"instance": {"points": [[0,0],[1,0],[0,1]]}}', "instance.digest is missing"),
+    (
+        "tampered.json",
+        '{"schema": 1, "instance": {"points": [[0,0],[1,0],[0,1]], "digest": "0"}}',
+        "digest does not belong to instance.points: one of them was changed",
+    ),
     ("null.json", "[[0, 0], [1, null], [0, 1]]", "None, not an integer"),
     ("ragged.json", "[[0, 0], [1], [0, 1]]", "point 1 has 1 coordinates"),
     ("deep.json", "[" * 100_000, "nested too deeply"),
@@ -228,13 +371,72 @@ BAD_FILES: list[tuple[str, str | bytes, str]] = [
     ("cut.npy", b"\x93NUMPY\x01\x00v\x00{'descr'", "no readable .npy"),
     ("hello.off", "hello", "the first line is 'hello'"),
     ("four.off", "4OFF\n1 0 0\n1 2 3 4\n", "dimension 3"),
-    ("cut.off", "OFF\n4 0 0\n0 0 0\n1 0 0\n", "no readable OFF"),
-    ("word.off", "OFF\n3 0 0\n0 0 0\n1 0 x\n0 1 1\n", "no readable OFF"),
-    ("hello.ply", "hello", "no readable PLY"),
-    ("cut.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n", "header promises 4"),
-    ("word.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n0 x 1\n1 1 1\n", "PLY"),
-    ("tail.ply", PLY_HEADER.format(encoding="ascii", kind="double") + "0 0 0\n1 0 0\n0 1 1\n1 1 2x\n", "PLY"),
-    ("short.ply", PLY_HEADER.format(encoding="binary_little_endian", kind="float").encode() + b"1234", "PLY"),
+    ("note.off", "# nothing\n", "the first line is ''"),
+    (
+        "cut.off",
+        "OFF\n4 0 0\n0 0 0\n1 0 0\n",
+        "ends before vertex 2 .* line 2 promises 4 vertices and 0 faces; is it cut",
+    ),
+    ("head.off", "OFF", "line 1: the numbers of vertices, faces and edges are expected, such as 4 4 6"),
+    ("binary.off", "OFF BINARY\n4 1 0\n", "line 1: the numbers of vertices, .* not 'BINARY'"),
+    ("word.off", "OFF\n3 0 0\n0 0 0\n1 0 x\n0 1 1\n", "line 4: 'x' is no decimal number"),
+    (
+        "formula.off",
+        "OFF\n3 0 0\n0 0 0\n1 0 1/2\n0 1 1\n",
+        "line 4: '1/2' is no decimal number; .* csv and json",
+    ),
+    ("nan.off", "OFF\n3 0 0\n0 0 0\n1 0 nan\n0 1 1\n", "line 4: .*'nan': coordinates must be finite"),
+    ("dots.off", "OFF\n3 0 0\n0 0 0\n1 0 1.2.3\n0 1 1\n", "line 4: .*'1.2.3'"),
+    (
+        "missing.off",
+        f"OFF\n4 1 0\n{ROWS[0]}{ROWS[1]}{ROWS[2]}3 0 1 2\n",
+        "line 6: a vertex .* '3 0 1 2', as line 2",
+    ),
+    (
+        "faces.off",
+        f"OFF\n# 9 faces\n4 9 0\n{''.join(ROWS)}3 0 1 2\n",
+        "ends before face 1 .*, but line 3 promises",
+    ),
+    (
+        "more.off",
+        f"OFF\n4 0 0\n{''.join(ROWS)}1 1 1\n",
+        "line 7: '1 1 1' is too much, as line 2 promises 4 vertices",
+    ),
+    (
+        "point.off",
+        f"OFF\n4 1 0\n{''.join(ROWS)}1 1 1\n",
+        "line 7: a face is expected, .* not '1 1 1', as line 2",
+    ),
+    ("index.off", f"OFF\n4 1 0\n{''.join(ROWS)}3 0 1 4\n", "line 7: '4' is no vertex; .* from 0 to 3"),
+    ("hello.ply", "hello", "the first line is 'hello', not ply"),
+    ("format.ply", "ply\nformat text 1.0\n", "line 2: the format is expected next, one of ascii, binary"),
+    (
+        "plane.ply",
+        PLY.replace("property double z\n", "") + "0 0\n1 0\n0 1\n1 1\n",
+        "no vertices with .* x, y and z",
+    ),
+    ("open.ply", PLY.replace("end_header\n", ""), "the header does not end"),
+    (
+        "header.ply",
+        PLY.replace("property", "attribute"),
+        "line 4: 'attribute double x' is no line of a header",
+    ),
+    (
+        "cut.ply",
+        PLY + "0 0 0\n1 0 0\n",
+        "ends before vertex 2 .* line 3 promises 'element vertex 4'; is it cut off",
+    ),
+    ("word.ply", PLY + "0 0 0\n1 0 0\n0 x 1\n1 1 1\n", "line 10: 'x' is no decimal number"),
+    ("tail.ply", PLY + "0 0 0\n1 0 0\n0 1 1\n1 1 2x\n", "line 11: '2x' is no decimal number"),
+    (
+        "missing.ply",
+        f"{PLY_FACES}{ROWS[0]}{ROWS[1]}{ROWS[2]}3 0 1 2\n",
+        "line 13: '3 0 1 2' is no vertex .* as line 3",
+    ),
+    ("more.ply", f"{PLY}{''.join(ROWS)}1 1 1\n", "line 12: '1 1 1' is too much, as line 3"),
+    ("face.ply", f"{PLY_FACES}{''.join(ROWS)}4 0 1 2\n", "line 14: '4 0 1 2' is no face .* as line 7"),
+    ("index.ply", f"{PLY_FACES}{''.join(ROWS)}3 0 1 7\n", "line 14: '7' is no vertex"),
+    ("short.ply", PLY.replace("ascii", "binary_little_endian").encode() + b"1234", "no readable PLY"),
     ("points.xyz", "0 0\n1 0\n0 1\n", "unknown suffix '.xyz'"),
     ("points", "0 0\n1 0\n0 1\n", "unknown suffix ''"),
 ]

@@ -14,7 +14,8 @@ from laboratory import edited, ledger_file
 from bcut.cli.main import run
 from bcut.errors import LedgerError
 from bcut.experiments.ledger import Ledger, read_ledger
-from bcut.experiments.replay import check_ledger, replay
+from bcut.experiments.replay import UncheckedCutsError, check_ledger, replay
+from bcut.verification import heavy_sets
 
 Captured = pytest.CaptureFixture[str]
 Entries = list[dict[str, Any]]
@@ -338,6 +339,33 @@ def test_a_cut_of_no_simplices_is_refused(made: Made, entry: Any) -> None:
     path = edited(made("loop")[0], lambda entries: first(entries, "link").update(simplices=entry))
     with pytest.raises(LedgerError, match="is malformed"):
         check_ledger(read_ledger(path))
+
+
+def test_cuts_that_take_too_long_are_named_and_not_refused(
+    made: Made, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    path = made("loop in the plane")[0]
+    everything = check_ledger(read_ledger(path))
+    monkeypatch.setattr(heavy_sets, "_MOST_STEPS", 10)
+    with pytest.raises(UncheckedCutsError) as caught:
+        check_ledger(read_ledger(path))
+    checks = caught.value.checks
+    assert not checks.refused
+    assert checks.proven["clique"] == everything.proven["clique"]
+    tired = dict(checks.unchecked)
+    assert len(tired) + checks.proven.get("odd-cycle", 0) == everything.proven["odd-cycle"]
+    assert run(["cuts", "verify", str(path)]) == 3
+    said = capsys.readouterr().err
+    number, reason = next(iter(tired.items()))
+    assert said.startswith(f"Error: {len(tired)} of the cuts were not checked (cut {number}: {reason}")
+    assert "it takes more than 10 steps to check a cut over" in reason
+    assert f"none is refused, {checks.proven['clique']} clique" in said
+    # A refusal is the graver thing.
+    other = edited(path, shift_rhs("clique", 1))
+    checks = check_ledger(read_ledger(other))
+    assert len(checks.refused) == 1
+    assert dict(checks.unchecked) == tired
+    assert run(["cuts", "verify", str(other)]) == 2
 
 
 # The commands.

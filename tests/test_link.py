@@ -269,9 +269,8 @@ def of_another_face(cut: CertificateCut) -> CertificateCut:
 
 def with_a_stranger(cut: CertificateCut) -> CertificateCut:
     """With one more simplex, which does not contain the face."""
-    return replace(
-        cut, simplices=(*cut.simplices, (0, 1, 2, 3)), coefficients=(*cut.coefficients, Fraction(1))
-    )
+    stranger = tuple(sorted({0, 1, 2, 3, 4} - {cut.proof["face"][0]}))[:4]
+    return replace(cut, simplices=(*cut.simplices, stranger), coefficients=(*cut.coefficients, Fraction(1)))
 
 
 def with_more_alpha(cut: CertificateCut) -> CertificateCut:

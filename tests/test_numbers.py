@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import subprocess
 import sys
@@ -184,6 +185,40 @@ def test_identities_hold_exactly(text: str, equal: str) -> None:
     assert left == right
     assert number_text(left) == number_text(right)
     assert hash(left) == hash(right)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["%r", "%.17g", "%.18e", "%.30e", "%f"])
+)
+def test_a_decimal_written_from_a_double_is_that_double(value: float, pattern: str) -> None:
+    assert parse_number(pattern % value) == Fraction(float(pattern % value))
+    # %f writes six digits behind the point, which are another double's.
+    assert pattern == "%f" or parse_number(pattern % value) == Fraction(value)
+
+
+@pytest.mark.parametrize("exponent", [-1074, -1073, -1022, -1021, -44, 53, 89, 1023])
+def test_the_shortest_texts_of_powers_of_two_are_read_back(exponent: int) -> None:
+    # The spacing below a power of two is half of that above, and there the shortest text may not be the rounded one.
+    for value in (2.0**exponent, math.nextafter(2.0**exponent, 0), math.nextafter(2.0**exponent, math.inf)):
+        assert parse_number(repr(value)) == Fraction(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e30", Fraction(1e30)),
+        ("10**30", Fraction(10**30)),
+        ("9007199254740993", Fraction(2**53 + 1)),
+        ("0.1000000000000000000000000", Fraction(0.1)),
+        ("0.12345678901234567", Fraction(0.12345678901234567)),
+        ("0.5000000000000000000000000000000", Fraction(1, 2)),
+        ("0e999", Fraction(0)),
+        ("-0.0", Fraction(0)),
+    ],
+)
+def test_decimals_are_doubles_and_integers_are_exact(text: str, value: Fraction) -> None:
+    assert parse_number(text) == value
 
 
 @pytest.mark.parametrize(
@@ -370,6 +405,15 @@ def test_numbers_survive_pickling() -> None:
         ("nan", "finite"),
         ("-inf", "finite"),
         ("1e999", "range of float64"),
+        ("1e-400", "would become 0; write it exactly"),
+        ("2*1e-400+1", "would become 0; write it exactly"),
+        ("0.12345678901234567890123", r"the nearest is 0\.12345678901234568; write that, or"),
+        ("-9007199254740993.0", r"the nearest is -9007199254740992\.0"),
+        ("9007199254740992.5", r"the nearest is 9007199254740992\.0"),
+        ("12345678901234567891e0", "the nearest is 1.2345678901234567e"),
+        ("0.10000000000000000000001", r"the nearest is 0\.1;"),
+        ("1.2345e-320", "no double is written like this"),
+        ("0." + "3" * 5000, "too long"),
         ("1/0", "divides by zero"),
         ("1/(1-1)", "divides by zero"),
         ("1/(sqrt(2)-sqrt(2))", "exactly zero"),

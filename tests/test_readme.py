@@ -59,7 +59,7 @@ def test_the_objectives_run(capsys: Captured) -> None:
     (block,) = [block for block in blocks("sh") if "--then" in block]
     (command,) = code_lines(block)
     assert run(shlex.split(command)[1:]) == 0
-    assert "optimal (proven)" in capsys.readouterr().out
+    assert "optimal (proven exactly)" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("elsewhere")

@@ -11,18 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bcut.errors import InputError, SeparatorLoadError
+from bcut.errors import InputError, SeparatorLoadError, VerificationError
 from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.crossings import crossing_matrix
 from bcut.geometry.triangulations import triangulations
+from bcut.instance import load_instance
 from bcut.separation.cases import CASES, CaseName, case
 from bcut.separation.check import RULES, CheckReport, check_separator
 from bcut.separation.driver import to_integers
-from bcut.separation.resolve import resolve
+from bcut.separation.resolve import built_in_names, resolve
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 from bcut.separation.template import template, write_template
 from bcut.separators.clique import Clique
 from bcut.separators.convex_polygon import ConvexPolygon
 from bcut.separators.odd_cycle import OddCycle
+from bcut.verification.dissection import check_dissection
+from bcut.verification.triangulation import check_triangulation
 
 FEW = (
     CaseName("hypersimplex:3,1"),
@@ -32,6 +36,8 @@ FEW = (
     CaseName("random:8,3,seed=1"),
     CaseName("cyclic:9,4"),
 )
+DISSECTIONS = tuple(name for name in CASES if name.dissection)
+FOR_DISSECTIONS = [name for name in built_in_names() if resolve(name).dissections]
 
 
 class Pairs(Separator):
@@ -64,7 +70,8 @@ def test_the_built_in_families_pass(name: str) -> None:
     assert report.violated > 10
     assert report.seconds < 30
     assert "passed" in report.summary
-    assert all(f"ok      {text}" in report.summary for text in RULES.values())
+    assert all(f"ok      {text}" in report.summary for rule, text in RULES.items() if rule != "dissections")
+    assert RULES["dissections"] not in report.summary
 
 
 def test_a_separator_of_a_few_lines_passes() -> None:
@@ -100,14 +107,15 @@ def test_an_invalid_cut_is_shown_with_the_triangulation_that_it_cuts_off() -> No
     assert broken(report) == {"valid"}
     (invalid,) = report.invalid_cuts
     assert invalid.instance == "cube:3"
+    assert not invalid.dissection
     assert (invalid.left, invalid.rhs) == (2, 1)
     small = case(CaseName("cube:3"))
-    columns = small.problem.formulation.columns_of(np.array(invalid.triangulation))
+    columns = small.problem.formulation.columns_of(np.array(invalid.solution))
     assert tuple(columns.tolist()) in set(triangulations(small.problem.chirotope))
-    named = [f"x[{' '.join(map(str, simplex))}]" for simplex in invalid.triangulation]
+    named = [f"x[{' '.join(map(str, simplex))}]" for simplex in invalid.solution]
     assert sum(name in invalid.cut for name in named) == 2
     assert "<= 1" in invalid.cut
-    assert str(invalid.triangulation[0]) in report.summary
+    assert str(invalid.solution[0]) in report.summary
 
 
 class Overlifted(OddCycle):
@@ -163,6 +171,75 @@ def test_small_mistakes_in_good_separators_are_caught(family: type[Separator]) -
     assert "valid" in broken(report)
     for invalid in report.invalid_cuts:
         assert invalid.left > invalid.rhs
+
+
+def test_some_built_in_families_are_for_dissections() -> None:
+    assert {"clique", "odd-cycle"} <= set(FOR_DISSECTIONS)
+    assert "link" not in FOR_DISSECTIONS
+
+
+@pytest.mark.parametrize("name", FOR_DISSECTIONS)
+def test_the_built_in_families_for_dissections_are_compared_with_all_of_them(name: str) -> None:
+    report = check_separator(lambda: resolve(name), DISSECTIONS)
+    assert report.ok, report.summary
+    assert (report.configurations, report.triangulations) == (len(DISSECTIONS), 0)
+    assert report.dissections == sum(case(name).incidence.shape[1] for name in DISSECTIONS) > 1500
+    assert report.violated > 10
+    assert f"ok      {RULES['dissections']}" in report.summary
+    assert f"0 triangulations and {report.dissections} dissections" in report.summary
+
+
+class NoCrossings(Separator):
+    """Right for triangulations; wrong to say that dissections have no simplices that merely cross, either."""
+
+    name = "no-crossings"
+    dissections = True
+
+    def separate(self, point: FractionalPoint) -> Iterator[Cut]:
+        columns = point.support
+        crossing = crossing_matrix(self.problem.chirotope, self.problem.simplices[columns])
+        for i, j in zip(*np.triu(crossing).nonzero(), strict=True):
+            if point.x[columns[i]] + point.x[columns[j]] > 1.001:
+                yield Cut([int(columns[i]), int(columns[j])], 1)
+
+
+def test_cuts_that_only_triangulations_satisfy_are_refused_for_dissections() -> None:
+    report = check_separator(NoCrossings, (*FEW, *DISSECTIONS))
+    assert broken(report) == {"dissections"}
+    assert f"FAILED  {RULES['dissections']}" in report.summary
+    assert f"ok      {RULES['valid']}" in report.summary
+    assert len(report.invalid_cuts) == len(report.failures) == 5
+    for invalid in report.invalid_cuts:
+        assert invalid.dissection
+        assert (invalid.left, invalid.rhs) == (2, 1)
+        assert f"{invalid.cut} cuts off a dissection" in report.summary
+        points = load_instance(invalid.instance.partition(" ")[0]).scalars()
+        check_dissection(points, invalid.solution)
+        with pytest.raises(VerificationError):
+            check_triangulation(points, invalid.solution)
+
+
+@pytest.mark.parametrize("name", DISSECTIONS, ids=str)
+def test_every_case_of_dissections_tells_crossing_from_overlapping(name: CaseName) -> None:
+    assert broken(check_separator(NoCrossings, [name])) == {"dissections"}
+
+
+def test_families_for_triangulations_are_not_asked_about_dissections() -> None:
+    class ForTriangulations(NoCrossings):
+        dissections = False
+
+    report = check_separator(ForTriangulations, (FEW[1], *DISSECTIONS))
+    assert report.ok, report.summary
+    assert report.configurations == 1
+    assert report.dissections is None
+    assert "dissection" not in report.summary
+
+
+def test_a_check_without_dissections_says_that_they_were_not_tested() -> None:
+    report = check_separator(NoCrossings, FEW[:2])
+    assert report.ok
+    assert report.dissections == 0
+    assert "as declared, was not tested" in report.summary
 
 
 def test_a_separator_that_raises_is_named_with_its_traceback() -> None:
@@ -298,7 +375,7 @@ def test_what_cannot_be_made_is_not_checked() -> None:
 
 
 @pytest.mark.parametrize("name", CASES, ids=str)
-def test_cases_have_all_their_triangulations(name: CaseName) -> None:
+def test_cases_have_all_their_solutions(name: CaseName) -> None:
     """Each column of the incidence matrix is a 0/1 point of the program, none twice."""
     small = case(name)
     formulation = small.problem.formulation
@@ -306,6 +383,9 @@ def test_cases_have_all_their_triangulations(name: CaseName) -> None:
     assert count > 0
     assert len(np.unique(small.incidence, axis=1).T) == count
     assert set(np.unique(small.incidence).tolist()) <= {0, 1}
+    assert small.problem.dissection == name.dissection
+    if name.dissection and not name.thinned:
+        assert count > len(list(triangulations(small.problem.chirotope, spanning=name.spanning)))
     activity = formulation.matrix.astype(np.int64) @ small.incidence.astype(np.int64)
     assert (activity == formulation.lower[:, None]).all()
     if name.thinned:
@@ -313,15 +393,15 @@ def test_cases_have_all_their_triangulations(name: CaseName) -> None:
 
 
 def test_cases_lead_to_fractional_vertices_in_most_dimensions() -> None:
-    dimensions = set()
+    found = set()
     for name in CASES:
         small = case(name)
         for costs in small.objectives():
             x = small.optimal_vertex(costs)
             assert x is not None
             if not FractionalPoint(small.problem, x).is_integral:
-                dimensions.add(small.problem.dimension)
-    assert dimensions >= {2, 3, 4}
+                found.add((small.problem.dimension, name.dissection))
+    assert found >= {(2, False), (3, False), (4, False), (2, True), (3, True)}
 
 
 def test_left_sides_are_exact_for_any_size_of_coefficient() -> None:

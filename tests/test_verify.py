@@ -192,6 +192,66 @@ def test_solver_tolerance_is_forgiven_in_bounds_that_are_doubles() -> None:
     assert verify(result_of(CUBE, CUBE_5, bound=4.2, gap=0.16)).value == 5
 
 
+TINY = {"default": "1/1000000000000", "costs": []}
+
+
+def tiny_grid(bound: Any, /, **costs: Any) -> dict[str, Any]:
+    """Four triangles of cost 1e-12 each, said to be optimal."""
+    apart = abs(4e-12 - float(Fraction(bound)))
+    table = {**TINY, **costs}
+    objective = {"problem__objective": "costs:gone.json", "problem__costs": table}
+    return result_of(GRID, GRID_4, value="1/250000000000", bound=bound, gap=apart, **objective)
+
+
+CHEAP = [[simplex, "1/1000000000000"] for simplex in GRID_4]
+ALL_TRIANGLES = [
+    [list(t), "1/1000000000000"] for t in combinations(range(6), 3) if t not in [(0, 1, 2), (3, 4, 5)]
+]
+
+
+@pytest.mark.parametrize(
+    "costs",
+    [
+        {},
+        # Nothing costs 1, whatever the table says.
+        {"costs": [[[0, 1, 2], 1]]},
+        {"default": 1, "costs": ALL_TRIANGLES},
+    ],
+)
+@pytest.mark.parametrize("bound", ["0", 0.0, 3.9e-12, "-1/1000000000000"])
+def test_small_costs_do_not_make_values_optimal(bound: Any, costs: dict[str, Any]) -> None:
+    assert verify({**tiny_grid(bound, **costs), "status": "limit"}).value == Fraction(4, 10**12)
+    with pytest.raises(VerificationError, match=r"'optimal', but its bound .* leaves room for a better value"):
+        verify(tiny_grid(bound, **costs))
+    turned = tiny_grid(bound, **costs)
+    turned["problem"]["sense"] = "max"
+    # The value is better than such a bound, and by more than rounding explains.
+    with pytest.raises(VerificationError, match="is better than its bound"):
+        verify(turned)
+
+
+def test_the_largest_cost_is_not_looked_for_where_sets_are_too_many() -> None:
+    with pytest.raises(VerificationError, match="leaves room"):
+        verify(tiny_grid(0), max_subsets=1)
+    # One of them may cost 1, as far as that is known without looking at all.
+    assert verify(tiny_grid(0, costs=[[[0, 1, 2], 1]]), max_subsets=1).value == Fraction(4, 10**12)
+
+
+@pytest.mark.parametrize("bound", [3.99999999999e-12, "3999999999/1000000000000000000000"])
+def test_what_solvers_leave_open_is_relative_to_small_values_too(bound: Any) -> None:
+    assert "optimality rests on the run itself" in verify(tiny_grid(bound)).statement
+
+
+@pytest.mark.parametrize("costs", [{"default": 1, "costs": CHEAP}, {"default": None, "costs": CHEAP}])
+def test_a_small_value_of_larger_costs_is_compared_with_these(costs: dict[str, Any]) -> None:
+    # All others cost 1, or what they cost is not known: solvers cannot tell 0 from 4e-12 then.
+    assert "optimality rests on the run itself" in verify(tiny_grid(0, **costs)).statement
+    with pytest.raises(VerificationError, match="leaves room"):
+        verify(tiny_grid(-1e-8, **costs))
+    hundredth = {**costs, "default": "1/100"} if costs["default"] else costs
+    verify(tiny_grid(-4e-12, **hundredth))
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [

@@ -240,6 +240,8 @@ class AveragedPart:
         self, face: NDArray[np.int64], local: NDArray[np.int64], coefficients: NDArray[np.int64]
     ) -> AveragedCut:
         """Return the mean of the images of a link cut, which speaks of some of the columns (by their places)."""
+        # An orbit has no more simplices in the cut than in all: no sum exceeds the group's order times the largest
+        # coefficient, and a link cut's stay far below 2**32.
         sums = np.zeros(len(self.sizes), dtype=np.int64)
         np.add.at(sums, self.orbit_of[local], coefficients)
         sums *= self.group.order // self.sizes

@@ -177,8 +177,10 @@ class _Loop:
     def beyond(self) -> OrbitBound | None:
         """Prove that there is no point by what another way to cover everything, for more than the target, costs."""
         objective = self.part.orbit_objective
-        cost = self.target + max(Fraction(1), abs(self.target))
-        costs = [*objective.exact_costs(np.arange(len(objective.numerators))), objective.sign * cost]
+        costs = objective.exact_costs(np.arange(len(objective.numerators)))
+        # Of the others' size: next to a far larger one, tolerances swallow them.
+        size = max(map(abs, costs), default=Fraction(0)) or Fraction(1)
+        costs.append(objective.sign * (self.target + max(size, abs(self.target))))
         wider = from_fractions(objective.name, objective.sense, costs)
         root = orbit_root(self.part.program(self.cuts).with_way_out(), wider)
         if root.bound is None:

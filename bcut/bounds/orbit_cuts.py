@@ -134,6 +134,8 @@ class OrbitLinks:
         """Return the coprime row, and what it takes to make it the mean of the images."""
         orbit_of = np.empty(len(item.simplices), dtype=np.int64)
         orbit_of[item.star.columns] = item.orbits
+        # An orbit has no more simplices in the star than in all: no sum exceeds the group's order times the largest
+        # coefficient, and a link cut's stay far below 2**32.
         row = np.zeros(len(self.formulation.simplices), dtype=np.int64)
         np.add.at(row, orbit_of[columns], coefficients * self.stabilisers[orbit_of[columns]])
         divisor = max(1, gcd(*row.tolist()))

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 # Where costs and duals are around 1, multipliers are multiples of 2**-SHIFT.
 SHIFT = 45
-# From this size on, the hull's volume is a factor of the denominator: without it, multipliers of the volume row would
-# be too coarse.
-_LARGE = 1 << 40
+# From this size on, the hull's volume is a factor of the denominator: without it, a multiplier of the volume row is a
+# multiple of 2**-SHIFT, and rounding it shifts the bound by up to 2**-SHIFT times the volume.
+_LARGE = 1 << 25
 
 
 class OrbitProgram(Protocol):
@@ -241,7 +241,7 @@ def _most(values: NDArray[Any]) -> int:
 
 
 def _products(columns: sp.csr_matrix, sizes: sp.csr_matrix, multipliers: NDArray[np.int64]) -> NDArray[Any]:
-    """Return the products of integer multipliers with the columns: of 64 bits where those do not exceed 2**62 noticeably.
+    """Return the products of integer multipliers with the columns, of 64 bits where they hardly exceed 2**62.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def _with_coverage(
 ) -> tuple[int, NDArray[Any], int]:
     """Return the bound and the reduced costs with a multiplier of the volume row, over the denominator."""
     volumes = formulation.volumes
-    # With large volumes, the denominator makes the multiplier have more than 40 bits, in addition to theirs.
+    # The multiplier has as many bits as the denominator, next to those of the volumes.
     if _most(reduced) + max(1, _most(volumes)) * abs(cover) >= 2**63:
         reduced, volumes = reduced.astype(object), volumes.astype(object)
     left = reduced - volumes * cover

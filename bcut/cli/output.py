@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from bcut.errors import InputError
+from bcut.summary import table as table
 
 
 def emit(text: str) -> None:
@@ -33,12 +34,6 @@ def emit(text: str) -> None:
 def emit_json(data: Any) -> None:
     """Write one JSON value to standard output."""
     emit(json.dumps(data, indent=1, allow_nan=False) + "\n")
-
-
-def table(rows: list[tuple[str, str]], *, indent: str = "  ") -> str:
-    """Return pairs as lines in two aligned columns."""
-    width = max((len(left) for left, _ in rows), default=0)
-    return "".join(f"{indent}{left:<{width}}  {right}".rstrip() + "\n" for left, right in rows)
 
 
 def _discard_standard_output() -> None:

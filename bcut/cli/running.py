@@ -35,7 +35,7 @@ def carry_out(
         The exit status of the program.
     """
     from bcut.cli.progress import progress_line
-    from bcut.cli.summary import summary
+    from bcut.summary import summary
 
     if separator and no_separators:
         raise click.UsageError("--separator and --no-separators contradict each other; drop one of them")

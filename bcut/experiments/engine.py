@@ -1,9 +1,12 @@
-"""Running a plan: what is stored is skipped, what ends is stored at once, and what fails fails alone."""
+"""Running a plan: what is stored is skipped, what ends is stored at once, and what fails fails alone.
+
+Runs that contradict each other about an optimum have failed too, though they are stored.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +14,7 @@ from typing import Any
 from bcut.experiments.plan import Plan, read_plan
 from bcut.experiments.pools import make_pool
 from bcut.experiments.process import Outcome
+from bcut.experiments.reporting.runs import load_experiment
 from bcut.experiments.store import Store, default_workers
 from bcut.experiments.tasks import SCHEMA, Task, tasks_of
 from bcut.experiments.versions import code_version, machine
@@ -27,11 +31,11 @@ class Progress:
     total : int
         Different runs that the plan asks for.
     stored : int
-        Those that were stored before.
+        Those that were stored before, and that no other run contradicts.
     done : int
         Those that ended well since.
     failures : list of (str, str, str)
-        Instance, variant and message of those that failed.
+        Instance, variant and message of those that failed, and of those that contradict each other or the plan.
     interrupted : bool
     last : str
         What ended last.
@@ -96,7 +100,23 @@ def run_experiment(
                         _tell(progress, on_progress)
             except KeyboardInterrupt:
                 progress.interrupted = True
+        if not progress.interrupted:
+            _count_contradictions(store, progress, before=distinct.keys() - open_tasks.keys())
     return progress
+
+
+def _count_contradictions(store: Store, progress: Progress, *, before: Set[str]) -> None:
+    """Count runs as failed that contradict another one, or the plan, about an optimum; `before` were stored before."""
+    counted: set[str] = set()
+    for found in load_experiment(store.folder).contradictions:
+        for claim in found.claims:
+            if claim.fingerprint and claim.fingerprint not in counted:
+                counted.add(claim.fingerprint)
+                if claim.fingerprint in before:
+                    progress.stored -= 1
+                else:
+                    progress.done -= 1
+                progress.failures.append((found.instance, claim.who, found.told_of(claim)))
 
 
 def _tell(progress: Progress, on_progress: Watcher | None) -> None:

@@ -1,6 +1,6 @@
 """What a run does: the presets of plans, each a way to work on one problem.
 
-A solver is imported by the presets that use it.
+Each imports the solver that it uses; before any of them, PySCIPOpt has been loaded to tell SCIP's version.
 """
 
 from __future__ import annotations
@@ -47,7 +47,13 @@ class Run:
         self.triangulation: list[list[int]] | None = None
 
     def outcome(self) -> dict[str, Any]:
-        """Do what the preset asks for; returns what came out, as plain data."""
+        """Do what the preset asks for; returns what came out, as plain data.
+
+        In it, ``integral`` says whether the root settled the problem, as the preset can tell. Our loop, and ``bcut
+        solve``: the point of the last relaxation at the root is a triangulation. SCIP's root: SCIP proved optimality
+        there, which it may do by rounding its bound, while the last relaxation's point is still fractional. None
+        where the root is not looked at.
+        """
         presets = {
             "loop": self.loop, "root": self.root, "solve": self.solve, "plain": self.plain, "sizes": self.sizes,
             "delaunay": self.delaunay,
@@ -115,9 +121,9 @@ class Run:
             self.ledger = self.recorder.finish_scip()
         lps = [finished.lp for finished in tree.rounds]
         return {
-            # SCIP proves optimality from rounded bounds; the last relaxation's point need not be integral.
             "lp": lps[0] if lps else None,
             "lp_after_cuts": lps[-1] if lps else None,
+            # By its point, or by rounding: see `outcome`. The point itself is not at hand.
             "integral": tree.status == "optimal",
             **self._of_tree(tree, objective, formulation, self._families(separation)),
         }

@@ -48,7 +48,7 @@ class Outcome:
     def of_exception(error: BaseException, message: str = "") -> Outcome:
         """Return the outcome of a run that could not be started or read: no disk space, no memory for a process."""
         trace = "".join(traceback.format_exception(error))
-        said = message or f"the run could not be carried out: {error or type(error).__name__}"
+        said = message or f"the run could not be carried out: {str(error) or type(error).__name__}"
         return Outcome(error={"kind": type(error).__name__, "message": said, "trace": trace})
 
 

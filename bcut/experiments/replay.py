@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.errors import LedgerError, VerificationError
+from bcut.errors import BcutError, LedgerError, VerificationError
 from bcut.experiments.ledger import Ledger
-from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut
+from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut, UncheckedError
 from bcut.verification.exact_points import ExactPoints
 
 # Relative to the larger of the bound and 1.
@@ -114,11 +114,37 @@ class CutChecks:
         Cuts of families that nobody can check, such as SCIP's own.
     refused : list of (int, str)
         Number and reason of those that do not hold.
+    unchecked : list of (int, str)
+        Number and reason of those that take too long to check: nothing is known of them.
     """
 
     proven: dict[str, int] = field(default_factory=dict)
     without_checker: dict[str, int] = field(default_factory=dict)
     refused: list[tuple[int, str]] = field(default_factory=list)
+    unchecked: list[tuple[int, str]] = field(default_factory=list)
+
+
+class UncheckedCutsError(BcutError):
+    """Cuts of a ledger that take too long to check, while none is refused.
+
+    Attributes
+    ----------
+    checks : CutChecks
+        With what became of the others.
+    """
+
+    exit_status = 3
+
+    def __init__(self, checks: CutChecks) -> None:
+        self.checks = checks
+        named = "; ".join(f"cut {number}: {reason}" for number, reason in checks.unchecked[:_MOST_REASONS])
+        more = len(checks.unchecked) - _MOST_REASONS
+        proven = ", ".join(f"{count} {family}" for family, count in sorted(checks.proven.items()))
+        super().__init__(
+            f"{len(checks.unchecked)} of the cuts were not checked ({named}"
+            + (f"; and {more} more" if more > 0 else "")
+            + f"); none is refused, {proven or 'none'} proven again"
+        )
 
 
 def check_ledger(ledger: Ledger) -> CutChecks:
@@ -129,13 +155,15 @@ def check_ledger(ledger: Ledger) -> CutChecks:
     Returns
     -------
     CutChecks
-        With all refusals. A right-hand side is refused as well where a smaller one follows: it is not the one that the
-        proof gives.
+        With all refusals, and what was not checked beside these. A right-hand side is refused as well where a smaller
+        one follows: it is not the one that the proof gives.
 
     Raises
     ------
     LedgerError
         A cut is malformed.
+    UncheckedCutsError
+        No cut is refused, but some take too long to check.
     """
     problem = ledger.header["problem"]
     points = ExactPoints(_configuration(ledger.header["instance"]).scalars())
@@ -161,8 +189,12 @@ def check_ledger(ledger: Ledger) -> CutChecks:
                 )
         except VerificationError as error:
             checks.refused.append((number, str(error)))
+        except UncheckedError as error:
+            checks.unchecked.append((number, str(error)))
         else:
             checks.proven[family] = checks.proven.get(family, 0) + 1
+    if checks.unchecked and not checks.refused:
+        raise UncheckedCutsError(checks)
     return checks
 
 

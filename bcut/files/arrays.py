@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bcut.errors import InputError
+from bcut.files.contents import Contents
 from bcut.files.text import read_bytes
 
 
-def read(path: Path) -> tuple[np.ndarray[Any, Any], str | None]:
+def read(path: Path) -> Contents:
     """Return the array of the file; pickled objects are never loaded.
 
     Raises
@@ -32,4 +32,4 @@ def read(path: Path) -> tuple[np.ndarray[Any, Any], str | None]:
         ) from None
     if not isinstance(array, np.ndarray):
         raise InputError(f"{path}: an archive of several arrays; write a single array with numpy.save")
-    return array, None
+    return Contents(array)

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from bcut.errors import InputError
-from bcut.files import arrays, clouds, native, table, topcom
+from bcut.files import arrays, native, off, ply, table, topcom
 from bcut.files.atomic import check_writable, write_text
-from bcut.files.text import read_bytes
+from bcut.files.contents import Contents
+from bcut.files.text import decoded, read_bytes
 from bcut.geometry.configuration import PointConfiguration
 
-_READERS: dict[str, Callable[[Path], tuple[Any, str | None]]] = {
+_READERS: dict[str, Callable[[Path], Contents]] = {
     ".json": native.read,
     ".dat": topcom.read,
     ".csv": table.read,
     ".npy": arrays.read,
-    ".off": clouds.read,
-    ".ply": clouds.read,
+    ".off": off.read,
+    ".ply": ply.read,
 }
 _WRITERS: dict[str, Callable[[PointConfiguration], str]] = {
     "json": native.format_points,
@@ -31,6 +32,7 @@ _WRITERS: dict[str, Callable[[PointConfiguration], str]] = {
 SUFFIXES = tuple(_READERS)
 #: Formats that `write_points` understands; also their suffixes.
 FORMATS = tuple(_WRITERS)
+_SURFACES = ", and off for surfaces (`bcut generate`)"
 
 
 def read_points(path: str | os.PathLike[str]) -> PointConfiguration:
@@ -50,8 +52,26 @@ def read_points(path: str | os.PathLike[str]) -> PointConfiguration:
         raise InputError(
             f"{file}: unknown suffix '{file.suffix}'; points are read from {', '.join(SUFFIXES)}"
         )
-    values, name = reader(file)
-    return PointConfiguration.from_values(values, name=name or file.stem, origin=str(file))
+    return reader(file).configuration(str(file), file.stem)
+
+
+def read_standard_input() -> PointConfiguration:
+    """Read a point configuration in the native format, or a result file, from the standard input.
+
+    Raises
+    ------
+    InputError
+        It is empty, or holds something else.
+    ConfigurationError
+        Its points are no configuration.
+    """
+    origin = "standard input"
+    content = sys.stdin.buffer.read() if sys.stdin is not None else b""
+    if not content.strip():
+        raise InputError(
+            f"{origin}: it is empty; it should hold points as JSON, which `bcut generate` writes"
+        )
+    return native.parse(decoded(content, origin), origin).configuration(origin, "stdin")
 
 
 def format_points(configuration: PointConfiguration, kind: str) -> str:
@@ -64,7 +84,7 @@ def format_points(configuration: PointConfiguration, kind: str) -> str:
     """
     writer = _WRITERS.get(kind.lower())
     if writer is None:
-        raise InputError(f"points cannot be written as '{kind}'; there are {', '.join(FORMATS)}")
+        raise InputError(f"points cannot be written as '{kind}'; there are {', '.join(FORMATS)}{_SURFACES}")
     return writer(configuration)
 
 

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from bcut.errors import ConfigurationError, InputError
+from bcut.files.contents import Contents
 from bcut.files.text import read_text
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.expressions import Expression, parse_coordinate
@@ -15,7 +16,7 @@ from bcut.geometry.expressions import Expression, parse_coordinate
 _LABEL = re.compile(r"(?!(nan|inf|infinity)$)[a-z_][\w -]*", re.IGNORECASE)
 
 
-def read(path: Path) -> tuple[list[list[Expression]], str | None]:
+def read(path: Path) -> Contents:
     """Points of a table; entries are coordinate texts. Lines that begin with # are skipped.
 
     Raises
@@ -41,10 +42,12 @@ def read(path: Path) -> tuple[list[list[Expression]], str | None]:
                 f"{path}: line {number} has {len(entries)} entries but line {rows[0][0]} has {width}; "
                 "give every point the same number of coordinates"
             )
-    return [
-        [_coordinate(path, number, column, entry) for column, entry in enumerate(entries, start=1)]
-        for number, entries in rows
-    ], None
+    return Contents(
+        [
+            [_coordinate(path, number, column, entry) for column, entry in enumerate(entries, start=1)]
+            for number, entries in rows
+        ]
+    )
 
 
 def format_points(configuration: PointConfiguration) -> str:

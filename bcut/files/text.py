@@ -40,11 +40,21 @@ def read_text(path: Path) -> str:
     InputError
         As `read_bytes`, or the file is not UTF-8 text.
     """
-    content = read_bytes(path)
+    return decoded(read_bytes(path), str(path))
+
+
+def decoded(content: bytes, origin: str) -> str:
+    """Return UTF-8 text without a byte-order mark; `origin` is what messages call it.
+
+    Raises
+    ------
+    InputError
+        It is not UTF-8 text.
+    """
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from None
+        raise InputError(f"{origin}: not UTF-8 text (byte {error.start}); save it as UTF-8") from None
     if "\0" in text:
-        raise InputError(f"{path}: binary data where text is expected; does the suffix fit the contents?")
+        raise InputError(f"{origin}: binary data where text is expected; does the suffix fit the contents?")
     return text

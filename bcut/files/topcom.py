@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from bcut.errors import ConfigurationError, InputError
+from bcut.files.contents import Contents
 from bcut.files.text import read_text
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.expressions import parse_coordinate
@@ -23,7 +24,7 @@ _TOKEN = re.compile(r"[\[\]]|[^\[\],\s]+")
 _NUMBER = re.compile(r"[+-]?[0-9]+(/[0-9]+)?", re.ASCII)
 
 
-def read(path: Path) -> tuple[list[list[Fraction]], str | None]:
+def read(path: Path) -> Contents:
     """Points of a TOPCOM file in affine coordinates; symmetry generators are ignored.
 
     Raises
@@ -41,7 +42,7 @@ def read(path: Path) -> tuple[list[list[Fraction]], str | None]:
             )
     for column in reversed(range(width)):
         if all(point[column] == 1 for point in points):
-            return [[*point[:column], *point[column + 1 :]] for point in points], None
+            return Contents([[*point[:column], *point[column + 1 :]] for point in points])
     if points and width in pivot_columns([*point, Fraction(1)] for point in points):
         raise InputError(
             f"{path}: these are no homogeneous coordinates: no linear functional is 1 on all points; "
@@ -49,7 +50,7 @@ def read(path: Path) -> tuple[list[list[Fraction]], str | None]:
         )
     base = points[0] if points else []
     kept = pivot_columns([a - b for a, b in zip(point, base, strict=True)] for point in points)
-    return [[point[column] for column in kept] for point in points], None
+    return Contents([[point[column] for column in kept] for point in points])
 
 
 def format_points(configuration: PointConfiguration) -> str:

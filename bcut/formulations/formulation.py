@@ -70,6 +70,10 @@ class Formulation:
     lazy: tuple[LazyRows, ...] = ()
     dissection: bool = False
 
+    def __repr__(self) -> str:
+        columns, rows = self.size
+        return f"<Formulation {self.name} of {self.configuration.name}: {columns} columns, {rows} rows>"
+
     @property
     def size(self) -> tuple[int, int]:
         """Numbers of columns and rows, without those that are added when they are needed."""

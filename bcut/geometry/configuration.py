@@ -57,7 +57,7 @@ class PointConfiguration:
         ----------
         values : (n, d) array of integers or floats, or a sequence of n sequences of d coordinates
             Coordinates are integers, `Fraction`, floats (taken exactly), `AlgebraicNumber` or texts such as
-            "1/3", "(1+sqrt(5))/2", "cos(2*pi/7)"; they may be mixed.
+            "1/3", "(1+sqrt(5))/2", "cos(2*pi/7)"; they may be mixed. The text "0.1" is the float 0.1.
         name : str
             What to call the configuration in results.
         origin : str, optional
@@ -194,7 +194,7 @@ class PointConfiguration:
         return hash((self.floats.shape, self.floats.tobytes()))
 
     def __repr__(self) -> str:
-        return f"<PointConfiguration {self.name!r}: {self.n} points in dimension {self.dimension}>"
+        return f"<PointConfiguration {self.name}: {self.n} points in dimension {self.dimension}>"
 
 
 def _checked_floats(coordinates: Coordinates) -> npt.NDArray[np.float64]:
@@ -226,7 +226,8 @@ def _checked_floats(coordinates: Coordinates) -> npt.NDArray[np.float64]:
     if rank < dimension:
         raise ConfigurationError(
             f"the points lie in a common hyperplane: they span dimension {rank} of {dimension}; "
-            f"give them in {rank} coordinates, or add a point outside"
+            + (f"give them in {rank} coordinates, or " if rank >= 2 else "")
+            + "add a point outside"
         )
     return floats
 

@@ -1,9 +1,13 @@
 """The grammar of coordinate texts, read without evaluating anything that could grow without bound.
 
-A coordinate is an integer, a rational "p/q", a decimal (taken as the float64 nearest to it, exactly), or an
-expression of these with + - * / ** (integer exponents), parentheses, sqrt(k) of a non-negative rational, and
-cos(q*pi) of a rational multiple of pi. What is rational is folded at once; what is not stays a small tree, to
-be evaluated in a number field once the field of the whole configuration is known.
+A coordinate is an integer, a rational "p/q", a decimal, or an expression of these with + - * / ** (integer
+exponents), parentheses, sqrt(k) of a non-negative rational, and cos(q*pi) of a rational multiple of pi. What is
+rational is folded at once; what is not stays a small tree, to be evaluated in a number field once the field of
+the whole configuration is known.
+
+A decimal stands for a float64: programs write theirs so, with 17 digits or as few as tell them apart, and what
+they wrote must be read back as it was. It is the float64 nearest to it, exactly; "0.1" is not "1/10". A decimal
+that no float64 is written like is refused, since it would be changed without a word.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import ast
 import math
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -25,7 +30,8 @@ _MAX_DEPTH = 150
 _MAX_EXPONENT = 1000
 
 _RATIONAL = re.compile(r"[+-]?[0-9]+(/[0-9]+)?", re.ASCII)
-_DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
+_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])([0-9]*)\.?([0-9]*)(?:[eE]([+-]?[0-9]+))?", re.ASCII)
+_EXACT_INTEGERS = 2.0**53
 _ALLOWED = re.compile(r"[0-9A-Za-z.+\-*/() \t]*", re.ASCII)
 _EXAMPLE = 'write it like "3", "-1/2", "0.25", "(1+sqrt(5))/2" or "cos(2*pi/7)"'
 
@@ -81,7 +87,7 @@ def parse_coordinate(text: str) -> Expression:
         if _RATIONAL.fullmatch(stripped):
             return _bounded(Fraction(stripped))
         if _DECIMAL.fullmatch(stripped):
-            return _decimal(stripped)
+            return Fraction(double_of(stripped))
         return _Reader(stripped).read()
     except ConfigurationError as error:
         raise ConfigurationError(f"cannot read the coordinate {_quote(text)}: {error}") from None
@@ -104,11 +110,46 @@ def terms_of(expression: Expression) -> Iterator[Term]:
             pending += [node.left, node.right]
 
 
-def _decimal(text: str) -> Fraction:
-    value = float(text)
+def double_of(text: str) -> float:
+    """Return the float64 that a decimal stands for.
+
+    Parameters
+    ----------
+    text : str
+        Digits with a point, an exponent or neither, perhaps behind a sign.
+
+    Raises
+    ------
+    ConfigurationError
+        No float64 is written like this: it is out of range, or its digits are those of another number.
+    """
+    match = _DECIMAL.fullmatch(text)
+    if match is None:
+        raise ConfigurationError(f"{text[:60]!r} is no number; {_EXAMPLE}")
+    whole, fraction, power = match.groups()
+    value = abs(float(text))
     if math.isinf(value):
-        raise ConfigurationError("it is beyond the range of float64")
-    return Fraction(value)
+        raise ConfigurationError("it is beyond the range of float64, about 1.8e308; scale the points down")
+    digits = (whole + fraction).lstrip("0")
+    kept = digits.rstrip("0")
+    if kept and value == 0:
+        raise ConfigurationError(
+            "it is too small for a float64 and would become 0; write it exactly, such as 1/10**400"
+        )
+    # 17 digits tell all float64 apart, so nobody who writes a fraction with so many means more than the nearest one.
+    # Integers beyond 2**53 are another matter: there an integer may be meant that is no float64.
+    clear = not kept or (len(kept) <= 17 and sys.float_info.min <= value < _EXACT_INTEGERS)
+    if not clear:
+        unit = Fraction(10) ** (int(power or 0) - len(fraction) + len(digits) - len(kept))
+        written = int(kept) * unit
+        # What a program writes is rounded from the float64, or the shortest text that is nearest to it. At powers of
+        # two, where the spacing changes, the latter need not be the former.
+        if 2 * abs(written - Fraction(value)) > unit and written != Fraction(repr(value)):
+            raise ConfigurationError(
+                "a number with a point or an exponent is a double, but no double is written like this: the nearest is "
+                f"{float(text)!r}; write that, or the exact number as an integer or a fraction p/q"
+            )
+    return float(text)
 
 
 def _bounded(value: Fraction) -> Fraction:
@@ -172,7 +213,7 @@ class _Reader:
         if re.fullmatch(r"[0-9]+", numeral):
             return _bounded(Fraction(int(numeral)))
         if _DECIMAL.fullmatch(numeral):
-            return _decimal(numeral)
+            return Fraction(double_of(numeral))
         raise ConfigurationError(f"{numeral!r} is no number; {_EXAMPLE}")
 
     def call(self, node: ast.Call, depth: int) -> Expression:

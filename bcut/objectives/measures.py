@@ -24,7 +24,7 @@ from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.subsets import ranks
 from bcut.objectives import geometric  # registers its measures
 from bcut.objectives.registry import MEASURES, Costs, Measure, Simplices, exact, measure, refuse_argument
-from bcut.objectives.syntax import MeasureName
+from bcut.objectives.syntax import FUNCTION, FunctionText, MeasureName
 from bcut.objectives.user import costs_of_function
 
 __all__ = [
@@ -47,7 +47,7 @@ _LONG_EXPONENT = re.compile(r"[eE][+-]?\d{4}")
 
 
 def measured(text: str, configuration: PointConfiguration, simplices: Simplices) -> Costs:
-    """Evaluate the measure that a user wrote: ``NAME``, ``NAME:ARGUMENT`` or ``FILE.py[:FUNCTION]``.
+    """Evaluate the measure that a user wrote: ``NAME``, ``NAME:ARGUMENT``, ``FILE.py[:FUNCTION]``, or a function.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def measured(text: str, configuration: PointConfiguration, simplices: Simplices)
         If a user's function raises, or returns something else than a finite cost for each simplex.
     """
     name = MeasureName.parse(text)
-    if name.is_file:
+    if name.is_file or isinstance(text, FunctionText):
         return costs_of_function(text, configuration, simplices)
     refuse_unknown(name)
     costs = MEASURES[name.source](configuration, simplices, name.argument)
@@ -88,6 +88,11 @@ def refuse_unknown(name: MeasureName) -> None:
     """
     if name.is_file or name.source in MEASURES:
         return
+    if name.source == FUNCTION:
+        raise InputError(
+            f"objective '{FUNCTION}:{name.argument}' is a function of a Python session, of which only the name is "
+            f"known here; hand it to bcut.solve itself, or write it to a file, as in ./mine.py:{name.argument}"
+        )
     near = difflib.get_close_matches(name.source, MEASURES, n=1)
     hint = (
         f"did you mean '{near[0]}'?"

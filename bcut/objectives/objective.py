@@ -19,6 +19,9 @@ from bcut.objectives.syntax import ObjectiveName, Sense, read_objective
 # Integer costs up to this size keep all exact bound computations within 64 bits.
 _MAX_NUMERATOR = 1 << 40
 
+# Sums of costs, also times the multipliers that bounds take, must be doubles.
+_LARGEST_SUM = 10**280
+
 # Costs of more units than this leave solvers no room for their tolerances.
 _MAX_UNITS = 10**6
 
@@ -232,7 +235,22 @@ def objective_of(name: ObjectiveName, formulation: Candidates) -> Objective:
     else:
         plain = from_fractions(name.text, name.sense, costs)
         numerators, denominator = plain.numerators, plain.denominator
-    return kind(name.text, name.sense, numerators, denominator)
+    objective = kind(name.text, name.sense, numerators, denominator)
+    _check_range(objective)
+    return objective
+
+
+def _check_range(objective: Objective) -> None:
+    """Refuse costs whose sums no double can hold, as solvers and result files need them."""
+    numerators = objective.numerators
+    if not len(numerators):
+        return
+    largest = max(abs(Fraction(numerators.min())), abs(Fraction(numerators.max()))) / objective.denominator
+    if largest * len(numerators) > _LARGEST_SUM:
+        raise InputError(
+            f"objective '{objective.name}': costs of {len(str(int(largest)))} digits have sums beyond the range of "
+            "float64; scale the costs, or the points they come from"
+        )
 
 
 def sum_objective(text: str, formulation: Candidates, *, sense: str | None = None, purpose: str) -> Objective:

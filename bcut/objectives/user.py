@@ -1,4 +1,4 @@
-"""A user's objective: one function of the coordinates of simplices, in a file of its own."""
+"""A user's objective: one function of the coordinates of simplices, in a file of its own or handed over from Python."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from bcut.errors import ObjectiveError, ObjectiveLoadError
 from bcut.files.plugins import guarded, import_file
 from bcut.geometry.configuration import PointConfiguration
 from bcut.objectives.registry import Costs, Ratios, Simplices
-from bcut.objectives.syntax import MeasureName
+from bcut.objectives.syntax import FunctionText, MeasureName
 
 # Integer costs up to this size stay in 64 bits.
 _MAX_INTEGER = 1 << 40
 
 
 def costs_of_function(text: str, configuration: PointConfiguration, simplices: Simplices) -> Costs:
-    """Call the function that a user wrote as ``FILE.py`` or ``FILE.py:FUNCTION`` with all simplices at once.
+    """Call the function that a user wrote as ``FILE.py`` or ``FILE.py:FUNCTION``, or handed over, with all simplices.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def costs_of_function(text: str, configuration: PointConfiguration, simplices: S
 
 
 def load_function(text: str) -> Callable[[NDArray[np.float64]], Any]:
-    """Import the file of an objective and return its function.
+    """Return the function of an objective, which stands in a file unless it was handed over.
 
     Raises
     ------
@@ -60,6 +60,8 @@ def load_function(text: str) -> Callable[[NDArray[np.float64]], Any]:
     ObjectiveError
         The file raises when it is imported.
     """
+    if isinstance(text, FunctionText):
+        return text.function
     name = MeasureName.parse(text)
     path = Path(name.source)
     module = import_file(

@@ -98,6 +98,12 @@ def built_in_names() -> list[str]:
     )
 
 
+def is_built_in(text: str) -> bool:
+    """Tell whether a text names a built-in family, whose cuts can be checked again."""
+    specification = Specification.parse(text)
+    return not specification.is_file and specification.source in built_in_names()
+
+
 def available() -> dict[str, type[Separator]]:
     """Return every separator that can be called by name, built-in ones first."""
     found = {name: _built_in(name) for name in built_in_names()}

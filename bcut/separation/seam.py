@@ -72,6 +72,9 @@ class Problem:
 
     formulation: Formulation
 
+    def __repr__(self) -> str:
+        return f"<Problem of {self.configuration.name}: {len(self.simplices)} simplices>"
+
     @property
     def configuration(self) -> PointConfiguration:
         """The point configuration."""
@@ -194,6 +197,12 @@ class FractionalPoint:
         self.x.setflags(write=False)
         self.support: NDArray[np.intp] = np.flatnonzero(self.x > TOLERANCE)
         self.fractional: NDArray[np.intp] = self.support[self.x[self.support] < 1 - TOLERANCE]
+
+    def __repr__(self) -> str:
+        return (
+            f"<FractionalPoint of {self.problem.configuration.name}: {len(self.support)} of {len(self.x)} simplices in "
+            f"its support, {len(self.fractional)} fractional>"
+        )
 
     @property
     def is_integral(self) -> bool:

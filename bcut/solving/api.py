@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bcut.errors import InputError
+from bcut.objectives.syntax import ObjectiveLike
 from bcut.result import Result
 from bcut.separation.observer import CutObserver
+from bcut.solving.arguments import read_argument
 from bcut.solving.groups import GroupLike
 from bcut.solving.options import InstanceLike, Options, SeparatorLike
 from bcut.solving.run import Run
@@ -16,16 +18,16 @@ from bcut.solving.search import Progress
 def solve(
     instance: InstanceLike,
     *,
-    objective: str = "cardinality",
+    objective: ObjectiveLike = "cardinality",
     sense: str | None = None,
-    then: Sequence[str] = (),
-    formulation: str | None = None,
+    then: ObjectiveLike | Sequence[ObjectiveLike] = (),
+    formulation: str | int | None = None,
     spanning: bool = False,
     dissection: bool = False,
     require: Sequence[Sequence[int]] = (),
     forbid: Sequence[Sequence[int]] = (),
     star: int | None = None,
-    separators: Sequence[SeparatorLike] | None = None,
+    separators: SeparatorLike | Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
     memory_limit: float | None = None,
     seed: int = 0,
@@ -39,18 +41,21 @@ def solve(
 
     Parameters
     ----------
-    instance : str, path or PointConfiguration
-        A file, a bundled instance or a family (``"cube:4"``).
-    objective : str
+    instance : str, path, points or PointConfiguration
+        A file, a bundled instance or a family (``"cube:4"``); or points, as an array of shape (n, d) or as lists of
+        coordinates.
+    objective : str, function, or (str, function)
         A measure, whose sum counts: ``"cardinality"``, ``"weight"``, ``"volume"``, ``"aspect-ratio"``, ``"min-angle"``
         (2D), ``"dihedral-angle"``, ``"solid-angle"`` (3D), ``"costs:FILE"``, ``"random-costs:SEED"``, or a function in
         a file, ``"./mine.py"`` or ``"./mine.py:function"``. ``"min-max:MEASURE"`` and ``"max-min:MEASURE"`` are
-        bottlenecks: the worst simplex counts.
+        bottlenecks: the worst simplex counts. A function itself may stand for a measure: it takes the coordinates of m
+        simplices, an array of shape (m, d + 1, d), and returns m costs, each of which depends on its own simplex only;
+        ``("max-min", function)`` makes a bottleneck of it.
     sense : {"min", "max"}, optional
         Of a sum, which is minimised without it. Bottlenecks have their own.
-    then : sequence of str
+    then : sequence of objectives
         Further objectives, each of which decides among the best by those before it: ``["cardinality"]``,
-        ``["max:weight"]``.
+        ``["max:weight"]``, ``[("max", function)]``. A text or a function may stand alone.
     formulation : {"2", "0", "1", "chambers"}, optional
         The integer program; "2", the cocircuit form, if left out, and "chambers" for dissections.
     spanning : bool
@@ -63,7 +68,7 @@ def solve(
     star : int, optional
         Only triangulations all of whose simplices have this point as a vertex.
     separators : sequence of str, Separator or Separator subclass, optional
-        The cut families at work; a default set when omitted, none when empty.
+        The cut families at work; a default set when omitted, none when empty. One of them may stand alone.
     time_limit : float, optional
         In seconds; what was found is returned when it is reached.
     memory_limit : float, optional
@@ -106,7 +111,7 @@ def solve(
     >>> bcut.solve("cube:3").value
     5
     """
-    options = Options(
+    options = Options.of(
         objective=objective,
         sense=sense,
         then=then,
@@ -124,8 +129,9 @@ def solve(
         symmetries=symmetries,
         invariant_under=invariant_under,
     )
-    run = Run(instance, options, on_progress)
-    run.search.cut_observer = cut_observer
+    observer = read_argument("cut_observer", cut_observer)
+    run = Run(instance, options, read_argument("on_progress", on_progress))
+    run.search.cut_observer = observer
     run.within_limits(run.solve)
     run.hand_out()
     return run.finish()
@@ -134,15 +140,15 @@ def solve(
 def bound(
     instance: InstanceLike,
     *,
-    objective: str = "cardinality",
+    objective: ObjectiveLike = "cardinality",
     sense: str | None = None,
-    formulation: str | None = None,
+    formulation: str | int | None = None,
     spanning: bool = False,
     dissection: bool = False,
     require: Sequence[Sequence[int]] = (),
     forbid: Sequence[Sequence[int]] = (),
     star: int | None = None,
-    separators: Sequence[SeparatorLike] | None = None,
+    separators: SeparatorLike | Sequence[SeparatorLike] | None = None,
     time_limit: float | None = None,
     memory_limit: float | None = None,
     seed: int = 0,
@@ -159,7 +165,7 @@ def bound(
         raise InputError(
             "method 'scip': it is for solve only; known here are auto, listing, orbits and fixing"
         )
-    options = Options(
+    options = Options.of(
         objective=objective,
         sense=sense,
         formulation=formulation,
@@ -176,7 +182,7 @@ def bound(
         symmetries=symmetries,
         only_bound=True,
     )
-    run = Run(instance, options, on_progress)
+    run = Run(instance, options, read_argument("on_progress", on_progress))
     run.search.status = "bound"
     run.within_limits(run.bound)
     run.search.columns = None

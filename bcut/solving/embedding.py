@@ -42,7 +42,7 @@ def costs_to_embed(
         default, table = read_costs(Path(measure.argument), configuration)
         entries = [[list(simplex), str(cost)] for simplex, cost in sorted(table.items())]
         return {"default": str(default), "costs": entries}
-    if not measure.is_file:
+    if not measure.is_function:
         return None
     simplices = search.whole.formulation.simplices
     if len(simplices) <= MAX_COSTS:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from bcut.errors import InputError, TooLargeError
 from bcut.files.atomic import check_writable, replacing
-from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.restrictions import Restrictions
 from bcut.instance import load_instance
 from bcut.objectives.objective import sum_objective
-from bcut.solving.options import InstanceLike
+from bcut.objectives.syntax import ObjectiveLike
+from bcut.solving.options import InstanceLike, Options
 from bcut.solving.programs import formulation_name, make_formulation
 
 #: Suffixes of model files, each a format.
@@ -22,9 +22,9 @@ def export(
     instance: InstanceLike,
     path: str | Path,
     *,
-    objective: str = "cardinality",
+    objective: ObjectiveLike = "cardinality",
     sense: str | None = None,
-    formulation: str | None = None,
+    formulation: str | int | None = None,
     spanning: bool = False,
     dissection: bool = False,
     require: Sequence[Sequence[int]] = (),
@@ -35,7 +35,7 @@ def export(
 
     Parameters
     ----------
-    instance : str, path or PointConfiguration
+    instance : str, path, points or PointConfiguration
     path : str or path
         Ends in ".lp" or ".mps". The variable of a simplex is called ``x_v0_v1_..._vd``, a cocircuit row after
         its (d-1)-simplex.
@@ -53,21 +53,33 @@ def export(
             f"{target}: unknown suffix '{target.suffix}'; models are written as {', '.join(MODEL_SUFFIXES)}"
         )
     check_writable(target)
-    name = formulation_name(formulation, dissection=dissection)
-    configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
+    asked = Options.of(
+        objective=objective,
+        sense=sense,
+        formulation=formulation,
+        spanning=spanning,
+        dissection=dissection,
+        require=require,
+        forbid=forbid,
+        star=star,
+    )
+    name = formulation_name(asked.formulation, dissection=asked.dissection)
+    configuration = load_instance(instance)
     program = make_formulation(
         name,
         configuration,
-        spanning=spanning,
-        dissection=dissection,
-        restrictions=Restrictions.of(configuration, require=require, forbid=forbid, star=star),
+        spanning=asked.spanning,
+        dissection=asked.dissection,
+        restrictions=Restrictions.of(
+            configuration, require=asked.require, forbid=asked.forbid, star=asked.star
+        ),
     )
     if program.lazy:
         raise TooLargeError(
             f"{configuration.name}: formulation {name} has rows that are only made when a point violates them, because "
             "they are many, or because volumes are no small integers; a file would lack them. Export formulation 2"
         )
-    costs = sum_objective(objective, program, sense=sense, purpose="a model file")
+    costs = sum_objective(asked.objective, program, sense=asked.sense, purpose="a model file")
     from bcut.scip.model import write_model
 
     with replacing(target) as temporary:

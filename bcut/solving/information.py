@@ -84,14 +84,14 @@ def info(instance: InstanceLike) -> Information:
 
     Parameters
     ----------
-    instance : str, path or PointConfiguration
+    instance : str, path, points or PointConfiguration
 
     Raises
     ------
     BcutError
         If the instance cannot be read.
     """
-    configuration = instance if isinstance(instance, PointConfiguration) else load_instance(instance)
+    configuration = load_instance(instance)
     n, d = configuration.n, configuration.dimension
     combinatorics, reason = None, None
     try:

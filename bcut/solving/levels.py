@@ -23,7 +23,7 @@ from bcut.solving.bottleneck import solve_bottleneck
 from bcut.solving.capping import capped_costs
 from bcut.solving.certificates import make_certificate
 from bcut.solving.embedding import costs_to_embed
-from bcut.solving.report import as_number, gap, proven_bound
+from bcut.solving.report import as_number, gap, proven_bound, settles
 from bcut.solving.search import Part, Search
 from bcut.solving.strategies import solve_at_once, solve_by_targets
 
@@ -202,7 +202,8 @@ class Levels:
                 record.status = search.status
                 record.value, record.bound = as_number(value), as_number(proven)
                 record.gap = gap(value, proven)
-                record.certificate = self.certificate(number)
+                certificate = self.certificate(number)
+                record.certificate = replace(certificate, settles=settles(search, certificate))
             records.append(record)
         return records
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 from bcut.errors import InputError
-from bcut.geometry.configuration import PointConfiguration
+from bcut.instance import InstanceLike as InstanceLike
 from bcut.separation.seam import Separator
+from bcut.solving.arguments import read_argument
 from bcut.solving.groups import GroupLike
 
 DEFAULT_SEPARATORS = ("link",)
@@ -17,7 +18,6 @@ DEFAULT_SEPARATORS = ("link",)
 SEPARATORS_FOR_STABLE_SETS = ("clique", "link")
 SEPARATORS_FOR_DISSECTIONS = ("clique", "odd-cycle")
 
-InstanceLike = str | os.PathLike[str] | PointConfiguration
 SeparatorLike = str | Separator | type[Separator]
 
 
@@ -32,19 +32,20 @@ class Options:
 
     Notes
     -----
-    The others are the parameters of `bcut.solve`, and are explained there.
+    The others are the parameters of `bcut.solve`, and are explained there. Whatever form they were given in, here they
+    are plain: an objective is a text, which may carry a function, and separators are a tuple.
     """
 
     objective: str = "cardinality"
     sense: str | None = None
-    then: Sequence[str] = ()
+    then: tuple[str, ...] = ()
     formulation: str | None = None
     spanning: bool = False
     dissection: bool = False
     require: Sequence[Sequence[int]] = ()
     forbid: Sequence[Sequence[int]] = ()
     star: int | None = None
-    separators: Sequence[SeparatorLike] | None = None
+    separators: tuple[SeparatorLike, ...] | None = None
     time_limit: float | None = None
     memory_limit: float | None = None
     seed: int = 0
@@ -52,6 +53,17 @@ class Options:
     symmetries: GroupLike | None = None
     invariant_under: int | GroupLike | None = None
     only_bound: bool = False
+
+    @classmethod
+    def of(cls, **given: Any) -> Options:
+        """Take the parameters as a user gave them.
+
+        Raises
+        ------
+        InputError
+            If one of them is of another type than `bcut.solve` says.
+        """
+        return cls(**{name: read_argument(name, value) for name, value in given.items()})
 
     def check(self) -> None:
         """Refuse limits and seeds that make no sense.

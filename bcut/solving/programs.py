@@ -25,7 +25,7 @@ FORMULATIONS: dict[str, Callable[..., Formulation]] = {
 DISSECTING = ("0", "chambers")
 
 
-def formulation_name(given: str | None, *, dissection: bool) -> str:
+def formulation_name(given: str | int | None, *, dissection: bool) -> str:
     """Return the formulation that is meant.
 
     Raises
@@ -33,7 +33,7 @@ def formulation_name(given: str | None, *, dissection: bool) -> str:
     InputError
         If there is no such one, or it knows no dissections and they are wanted.
     """
-    name = given or ("chambers" if dissection else "2")
+    name = ("chambers" if dissection else "2") if given is None else str(given)
     if name not in FORMULATIONS:
         raise InputError(f"unknown formulation '{name}': known are {', '.join(FORMULATIONS)}")
     if dissection and name not in DISSECTING:

@@ -6,7 +6,7 @@ import json
 import os
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from importlib.metadata import version
@@ -28,6 +28,9 @@ from bcut.files.surfaces import read_surface
 from bcut.formulations.region import RegionProgram, covering_program, packing_program, tetrahedra_crossing
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.surface import Region
+from bcut.records import load_record
+from bcut.solving.arguments import read_argument
+from bcut.summary import table
 
 SCHEMA = 1
 
@@ -71,6 +74,37 @@ class RegionResult:
     versions: dict[str, str] = field(default_factory=dict)
     kind: str = "region"
     schema: int = SCHEMA
+
+    def __repr__(self) -> str:
+        covered = self.covered or "nothing so far"
+        text = f"{self.instance['name']}: volume {self.volume}, covered {covered}, {self.status}"
+        return f"<RegionResult {text}>"
+
+    def __str__(self) -> str:
+        texts = {
+            "optimal": f"triangulable, with {self.value} tetrahedra and no fewer (proven)",
+            "infeasible": "not triangulable without new points (proven)",
+        }
+        rows = [
+            ("region", str(self.instance["name"])),
+            ("status", texts.get(self.status, self.status)),
+            ("volume", self.volume),
+            ("covered", self.covered or "nothing so far"),
+            ("tetrahedra", f"{len(self.triangulation or ())} of {self.tetrahedra} inside"),
+            ("seconds", f"{self.seconds:.2f}"),
+        ]
+        return table(rows, indent="").rstrip("\n")
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str] | Mapping[str, Any]) -> RegionResult:
+        """Make a result of a result file, or of its data, as `to_dict` returns them; see `bcut.Result.load`.
+
+        Raises
+        ------
+        ResultError
+            It cannot be read, belongs to another schema, lacks an entry, has one of the wrong type or an unknown one.
+        """
+        return load_record(cls, source, schema=SCHEMA, about="region")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result file as plain data."""
@@ -151,14 +185,20 @@ def region(
     >>> bcut.region("schoenhardt").status
     'infeasible'
     """
+    time_limit = read_argument("time_limit", time_limit)
     if time_limit is not None and not time_limit > 0:
         raise InputError(f"a time limit of {time_limit} seconds is no positive number; leave it out for none")
-    if isinstance(instance, tuple):
+    if isinstance(instance, str | os.PathLike):
+        points, faces = load_surface(instance)
+    elif isinstance(instance, tuple) and len(instance) == 2:
         points, faces = instance
         if not isinstance(points, PointConfiguration):
             points = PointConfiguration.from_values(points)
     else:
-        points, faces = load_surface(instance)
+        raise InputError(
+            "a region is a file with faces, a family of surfaces such as 'schoenhardt', or a pair (points, triangles), "
+            f"not {type(instance).__name__}"
+        )
     return _Work(Region.of(points, faces), time_limit).run()
 
 

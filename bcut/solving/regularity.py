@@ -41,6 +41,11 @@ class Regularity:
     heights: tuple[Fraction, ...] | None = None
     multipliers: tuple[tuple[Simplex, Fraction | AlgebraicNumber], ...] | None = None
 
+    def __repr__(self) -> str:
+        if self.regular:
+            return f"<Regularity: regular, by {len(self.heights or ())} heights>"
+        return f"<Regularity: not regular, by the conditions of {len(self.multipliers or ())} facets>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return the answer as plain data, numbers as exact texts."""
         return {

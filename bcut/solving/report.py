@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import platform
 import time
+from dataclasses import replace
 from fractions import Fraction
+from math import ceil, floor
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,9 @@ import bcut
 from bcut.errors import SolverError
 from bcut.geometry.configuration import PointConfiguration
 from bcut.result import Certificate, Instance, Question, Result, Root, RoundRecord, Size
+from bcut.separation.resolve import is_built_in
 from bcut.solving.search import Search
+from bcut.verification.cuts import CUT_CHECKERS
 
 
 def make_result(
@@ -43,15 +47,16 @@ def make_result(
     Raises
     ------
     SolverError
-        If what was found is no triangulation.
+        If what was found is no triangulation, or what was proven cannot be.
     """
     triangulation = None
     if search.columns is not None:
         triangulation = search.whole.formulation.simplices[np.sort(search.columns)].tolist()
         with search.timed("verify"):
             _verify(configuration, triangulation, question)
-    search.seconds["total"] = time.perf_counter() - started
     proven = proven_bound(search)
+    _check_consistency(configuration, question, search, proven)
+    search.seconds["total"] = time.perf_counter() - started
     return Result(
         instance=_describe_instance(configuration),
         problem=question,
@@ -70,7 +75,7 @@ def make_result(
         separators={name: vars(family).copy() for name, family in search.statistics.items()},
         seconds=search.seconds,
         triangulation=triangulation,
-        certificate=certificate,
+        certificate=replace(certificate, settles=settles(search, certificate)),
         versions=_versions(),
     )
 
@@ -92,6 +97,30 @@ def _verify(configuration: PointConfiguration, triangulation: list[list[int]], q
         raise SolverError(f"{configuration.name}: the solver's answer is no {what}: {error}") from error
 
 
+def _check_consistency(
+    configuration: PointConfiguration, question: Question, search: Search, proven: Fraction | None
+) -> None:
+    """Refuse what contradicts itself: a cut that is not valid, or a solver that errs, leads to such results."""
+    blame = "a solver erred"
+    foreign = [name for name in question.separators if not is_built_in(name)]
+    if foreign:
+        blame = f"cuts of {', '.join(foreign)} are not valid (see `bcut separators check`), or " + blame
+    if search.status == "infeasible" and not search.restricted and question.invariant_under is None:
+        raise SolverError(
+            f"{configuration.name}: the search ended without a triangulation, though there is always one: {blame}"
+        )
+    value, sign = search.value, search.sign
+    if value is None or proven is None:
+        return
+    # Bounds from solvers' trees are within their tolerances.
+    room = max(Fraction(search.whole.objective.largest_cost), abs(value)) / 10**6
+    if sign * value < sign * proven - room:
+        raise SolverError(
+            f"{configuration.name}: the bound {as_number(proven)} is refuted by a triangulation of the value "
+            f"{as_number(value)}: {blame}"
+        )
+
+
 def _describe_instance(configuration: PointConfiguration) -> Instance:
     points = [list(point) for point in configuration.exact_points()]
     return Instance(configuration.name, configuration.dimension, points, configuration.digest)
@@ -106,6 +135,53 @@ def proven_bound(search: Search) -> Fraction | None:
     if search.bound is None:
         return None
     return search.sign * search.rounded_up(search.bound)
+
+
+def settles(search: Search, certificate: Certificate) -> str | None:
+    """Tell whether a certificate proves the status of a search: `bcut.result.Certificate.settles`.
+
+    Exact multipliers do, where their bound meets the value, or where they refute all that is better. What rests on a
+    solver's tree, on what a solver says of a relaxation without a point, or on cuts that nobody checks again, is no
+    proof.
+    """
+    if search.status == "infeasible":
+        return "exactly" if certificate.infeasible else None
+    value, proven = search.value, _certified(search, certificate)
+    if search.status != "optimal" or value is None or proven is None:
+        return None
+    short = search.sign * value - proven
+    if short <= 0:
+        return "exactly"
+    size = min(max(Fraction(search.whole.objective.largest_cost), abs(value)), max(Fraction(1), abs(value)))
+    return "within 1e-9" if short <= size / 10**9 else None
+
+
+def _certified(search: Search, certificate: Certificate) -> Fraction | None:
+    """Return the bound on ``sign * objective`` that a certificate proves, an integer where all costs are."""
+    sign = search.sign
+    if certificate.threshold is not None:
+        return sign * Fraction(certificate.threshold)
+    if certificate.bound is None:
+        return None
+    unit = search.whole.objective.unit if search.unit is None else search.unit
+    integral = unit.denominator == 1
+    proven = sign * Fraction(certificate.bound)
+    proven = Fraction(ceil(proven)) if integral else proven
+    refuted = certificate.refutes
+    if refuted is not None and _families(refuted) <= set(CUT_CHECKERS):
+        target = sign * Fraction(refuted["target"])
+        proven = max(proven, Fraction(floor(target) + 1) if integral else target)
+    return proven
+
+
+def _families(proof: dict[str, Any]) -> set[str]:
+    """Return the cut families in a refutation, cases included."""
+    case = proof.get("case", proof)
+    found = {cut["family"] for stage in case["stages"] for cut in stage["cuts"]}
+    for part in ("chosen", "excluded"):
+        if part in case:
+            found |= _families(case[part])
+    return found
 
 
 def as_number(value: Fraction | None) -> int | float | None:

@@ -55,6 +55,8 @@ def reach_targets(search: Search) -> None:
                 # There may be no solution at all, and then no target is the last one.
                 solve_at_once(search)
                 return
+            # Cuts that are not valid refute every target; below a triangulation there is a last one.
+            place(search)
         elif outcome == "reached":
             assert search.value is not None
             search.raise_bound(search.sign * search.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 from math import ceil, floor
 
@@ -11,6 +12,9 @@ from bcut.verification.reading import ResultData
 
 # Bounds that are no integers come from floating-point solvers, which stop at a relative gap of this size.
 RELATIVE_GAP = Fraction(1, 10**9)
+
+#: Returns the largest absolute value of a cost, None where it is not known; it takes long, and is rarely asked for.
+LargestCost = Callable[[], Fraction | None]
 
 
 def rounded(bound: Fraction, sense: str, integral: bool) -> Fraction:
@@ -25,12 +29,29 @@ def is_better(first: Fraction, second: Fraction, sense: str) -> bool:
     return first < second if sense == "min" else first > second
 
 
-def relative_gap(value: Fraction, bound: Fraction) -> Fraction:
-    """Return ``|value - bound| / max(1, |value|)``."""
+def gap_entry(value: Fraction, bound: Fraction) -> Fraction:
+    """Return what a result file calls the gap, ``|value - bound| / max(1, |value|)``: absolute for small values."""
     return abs(value - bound) / max(Fraction(1), abs(value))
 
 
-def check_consistency(data: ResultData, value: Fraction | None, *, integral: bool) -> None:
+def is_close(value: Fraction, bound: Fraction, largest: LargestCost) -> bool:
+    """Tell whether value and bound differ by no more than the solvers' tolerance.
+
+    It is relative to the value, or to the largest cost where the value is smaller than that and smaller than 1. Where
+    the largest cost is not known, it is taken for 1 there.
+    """
+    difference = abs(value - bound)
+    if difference <= RELATIVE_GAP * abs(value):
+        return True
+    if difference > RELATIVE_GAP * max(Fraction(1), abs(value)):
+        return False
+    cost = largest()
+    return cost is None or difference <= RELATIVE_GAP * cost
+
+
+def check_consistency(
+    data: ResultData, value: Fraction | None, largest: LargestCost, *, integral: bool
+) -> None:
     """Check what a result says of itself.
 
     Parameters
@@ -38,6 +59,7 @@ def check_consistency(data: ResultData, value: Fraction | None, *, integral: boo
     data : ResultData
     value : Fraction or None
         Of its triangulation, re-computed.
+    largest : callable
     integral : bool
         Whether all values are integral.
 
@@ -64,23 +86,22 @@ def check_consistency(data: ResultData, value: Fraction | None, *, integral: boo
         claim = "no value" if data.value is None else f"the value {shown(data.value.exact)}"
         raise VerificationError(f"it claims {claim}, but its triangulation has the value {shown(value)}")
     if value is not None:
-        _check_bound(data, value, integral)
+        _check_bound(data, value, largest, integral)
     _check_gap(data, value)
 
 
-def _check_bound(data: ResultData, value: Fraction, integral: bool) -> None:
+def _check_bound(data: ResultData, value: Fraction, largest: LargestCost, integral: bool) -> None:
     if data.bound is None:
         if data.status == "optimal":
             raise VerificationError("its status is 'optimal', but it has no bound")
         return
     bound = data.bound.exact
-    gap = relative_gap(value, bound)
-    if is_better(value, bound, data.sense) and not (data.bound.is_double and gap <= RELATIVE_GAP):
+    if is_better(value, bound, data.sense) and not (data.bound.is_double and is_close(value, bound, largest)):
         raise VerificationError(
             f"its value {shown(value)} is better than its bound {shown(bound)}, so the bound is wrong"
         )
     reached = not is_better(rounded(bound, data.sense, integral), value, data.sense)
-    if data.status == "optimal" and not reached and (integral or gap > RELATIVE_GAP):
+    if data.status == "optimal" and not reached and (integral or not is_close(value, bound, largest)):
         raise VerificationError(
             f"its status is 'optimal', but its bound {shown(bound)} leaves room for a better value than "
             f"{shown(value)}"
@@ -92,7 +113,7 @@ def _check_gap(data: ResultData, value: Fraction | None) -> None:
         if data.gap is not None:
             raise VerificationError(f"it has the gap {shown(data.gap)}, but not both a value and a bound")
         return
-    gap = relative_gap(value, data.bound.exact)
+    gap = gap_entry(value, data.bound.exact)
     if data.gap is None or abs(data.gap - gap) > RELATIVE_GAP * max(Fraction(1), gap):
         claim = "none" if data.gap is None else shown(data.gap)
         raise VerificationError(

@@ -101,8 +101,15 @@ def plain_data(source: Source) -> tuple[Any, str]:
     ResultError
         It cannot be read.
     """
+    if isinstance(source, Mapping):
+        return source, "the result"
     if not isinstance(source, str | os.PathLike):
-        return source if isinstance(source, Mapping) else source.to_dict(), "the result"
+        if not callable(getattr(source, "to_dict", None)):
+            raise ResultError(
+                "a result is the path of a result file, its data, or what bcut.solve returned, "
+                f"not {type(source).__name__}"
+            )
+        return source.to_dict(), "the result"
     label = f"result file {os.fspath(source)}"
     return _parse(Path(source), label), label
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from bcut.verification.certificate_data import CertifiedBound
-from bcut.verification.consistency import RELATIVE_GAP, is_better, relative_gap, shown
+from bcut.verification.consistency import RELATIVE_GAP, LargestCost, is_better, is_close, shown
 from bcut.verification.reading import ResultData
 
 
@@ -14,6 +14,7 @@ def statement(
     value: Fraction | None,
     best: Fraction | None,
     certified: CertifiedBound | None,
+    largest: LargestCost,
 ) -> str:
     """Say in words what holds of an objective.
 
@@ -26,6 +27,7 @@ def statement(
     best : Fraction or None
         The bound that its certificate proves, rounded where values are integral.
     certified : CertifiedBound or None
+    largest : callable
     """
     noun = "dissection" if data.dissection else "triangulation"
     if data.status == "infeasible":
@@ -45,10 +47,8 @@ def statement(
             parts.append(f"not claimed to be optimal (status '{data.status}')")
         if data.bound is not None and (best is None or is_better(best, data.bound.exact, data.sense)):
             parts.append(f"the bound {shown(data.bound.exact)} rests on the solver's tree")
-    elif best is not None and relative_gap(value, best) <= RELATIVE_GAP:
-        parts.append(
-            f"so the value is optimal up to a relative gap of {float(relative_gap(value, best)):.1e}"
-        )
+    elif best is not None and (closeness := _closeness(value, best, largest)):
+        parts.append(f"so the value is optimal up to {closeness}")
     else:
         # With a bound, what is left is the search between it and the value.
         rest = "run itself" if best is None else "solver's tree"
@@ -56,9 +56,21 @@ def statement(
     return "; ".join(parts)
 
 
+def _closeness(value: Fraction, best: Fraction, largest: LargestCost) -> str:
+    """Say how close a bound is to a value; nothing where it is not close, or that is not known."""
+    difference = abs(value - best)
+    if difference <= RELATIVE_GAP * abs(value):
+        return f"a relative gap of {float(difference / abs(value)):.1e}"
+    cost = largest() if is_close(value, best, largest) else None
+    return "" if cost is None else f"{float(difference / cost):.1e} of the largest cost"
+
+
 def _bound_statement(data: ResultData, best: Fraction | None, certified: CertifiedBound | None) -> str:
     if best is not None:
-        return f"bound {shown(best)} proven exactly"
+        proven = f"bound {shown(best)} proven exactly"
+        if certified is not None and certified.obstacle:
+            return f"{proven}; what its certificate proves beyond that was not re-checked: {certified.obstacle}"
+        return proven
     if certified is not None:
         return f"the bound of its certificate was not re-checked: {certified.obstacle}"
     reason = data.certificate.reason if data.certificate is not None else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cache
 
 from bcut.errors import ConfigurationError, InputError, ResultError, VerificationError
 from bcut.geometry.configuration import PointConfiguration
@@ -17,7 +18,8 @@ from bcut.verification.consistency import (
     rounded,
     shown,
 )
-from bcut.verification.costs import Costs
+from bcut.verification.costs import Costs, largest_cost
+from bcut.verification.cut_data import Candidates
 from bcut.verification.dissection import check_dissection
 from bcut.verification.exact_points import ExactPoints, Simplex
 from bcut.verification.goals import Certifier, Goal, Settled, certify
@@ -69,6 +71,9 @@ class Verification:
     proven_optimal: bool = False
     checks: list[str] = field(default_factory=list)
     further: list[GoalVerification] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        return f"<Verification: {self.statement}>"
 
 
 def verify(result: Source, *, max_subsets: int | None = None) -> Verification:
@@ -123,6 +128,10 @@ class _Verifier:
         self.checks: list[str] = []
         self.simplices: Sequence[Simplex] = ()
 
+    @property
+    def _max_subsets(self) -> int:
+        return MAX_SUBSETS if self.max_subsets is None else self.max_subsets
+
     def run(self) -> Verification:
         data = self.data
         configuration = self._configuration()
@@ -158,7 +167,13 @@ class _Verifier:
         """Check what a result says of one objective."""
         certified = self._certified(data, points, goal, earlier)
         integral = goal.costs.integral or (certified is not None and certified.integral)
-        check_consistency(data, value, integral=integral)
+
+        @cache
+        def largest() -> Fraction | None:
+            candidates = Candidates(points, spanning=data.spanning, restrictions=data.restrictions)
+            return largest_cost(candidates, goal.costs, self._max_subsets)
+
+        check_consistency(data, value, largest, integral=integral)
         self.checks.append(f"status '{data.status}', value, bound and gap do not contradict each other")
         exact = None if certified is None else certified.bound
         best = None if exact is None else rounded(exact, data.sense, integral)
@@ -169,7 +184,7 @@ class _Verifier:
                 f"{shown(value)}: one of the two checks is wrong, which is a defect of bcut; please report it"
             )
         return GoalVerification(
-            statement=statement(data, value, best, certified),
+            statement=statement(data, value, best, certified, largest),
             value=value,
             exact_bound=exact,
             rounded_bound=best,
@@ -293,7 +308,7 @@ class _Verifier:
             raise VerificationError(
                 "its certificate claims that there is no triangulation, but the rest of the result does not"
             )
-        check_consistency(data, None, integral=False)
+        check_consistency(data, None, lambda: None, integral=False)
         certified = certified_bound(
             points,
             certificate,
@@ -301,7 +316,7 @@ class _Verifier:
             sense="min",
             spanning=data.spanning,
             restrictions=data.restrictions,
-            max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+            max_subsets=self._max_subsets,
         )
         if certified.bound is None:
             return Verification(
@@ -379,7 +394,7 @@ class _Verifier:
                 sense=sense,
                 spanning=self.data.spanning,
                 restrictions=self.data.restrictions,
-                max_subsets=MAX_SUBSETS if self.max_subsets is None else self.max_subsets,
+                max_subsets=self._max_subsets,
             )
 
         return certifier

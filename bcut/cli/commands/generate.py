@@ -27,7 +27,8 @@ import click
 def generate(instance: str | None, list_families: bool, output: Path | None, kind: str | None) -> int:
     """Write the points of INSTANCE, exactly, as a file of points; as OFF, with its faces.
 
-    INSTANCE is a member of a family, such as cube:4, or a file of points, which is then converted.
+    INSTANCE is a member of a family, such as cube:4, or a file of points, which is then converted; a result file is
+    one, too. A dash stands for standard input (as JSON) and output, as in `bcut generate cube:3 | bcut solve -`.
     """
     from bcut.cli.output import emit, table
     from bcut.cli.running import check_output
@@ -44,6 +45,8 @@ def generate(instance: str | None, list_families: bool, output: Path | None, kin
     from bcut.files import format_points, write_points
     from bcut.instance import load_instance
 
+    if output == Path("-"):
+        output = None
     check_output(output, instance)
     if (kind or (output.suffix[1:].lower() if output is not None else "")) == "off":
         return _write_surface(instance, output)
@@ -58,10 +61,10 @@ def generate(instance: str | None, list_families: bool, output: Path | None, kin
 def _write_surface(instance: str, output: Path | None) -> int:
     from bcut.cli.output import emit
     from bcut.files.atomic import write_text
-    from bcut.files.surfaces import format_off
+    from bcut.files.off import format_points
     from bcut.solving.region import load_surface
 
-    text = format_off(*load_surface(instance))
+    text = format_points(*load_surface(instance))
     if output is None:
         emit(text)
     else:

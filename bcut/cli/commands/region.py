@@ -28,7 +28,7 @@ def region(instance: str, time_limit: float | None, output: Any, as_json: bool, 
     status 0: settled, either way; 3: a limit came first; 2: the triangles bound no region.
     """
     from bcut.cli.exits import exit_status
-    from bcut.cli.output import emit, table
+    from bcut.cli.output import emit
     from bcut.cli.running import check_output
     from bcut.solving.region import region as call
 
@@ -39,17 +39,5 @@ def region(instance: str, time_limit: float | None, output: Any, as_json: bool, 
     if as_json:
         emit(found.to_json())
     elif not quiet:
-        texts = {
-            "optimal": f"triangulable, with {found.value} tetrahedra and no fewer (proven)",
-            "infeasible": "not triangulable without new points (proven)",
-        }
-        rows = [
-            ("region", str(found.instance["name"])),
-            ("status", texts.get(found.status, found.status)),
-            ("volume", found.volume),
-            ("covered", found.covered or "nothing so far"),
-            ("tetrahedra", f"{len(found.triangulation or ())} of {found.tetrahedra} inside"),
-            ("seconds", f"{found.seconds:.2f}"),
-        ]
-        emit(table(rows, indent="") + (f"written to {output}\n" if output is not None else ""))
+        emit(f"{found}\n" + (f"written to {output}\n" if output is not None else ""))
     return exit_status(found.status)

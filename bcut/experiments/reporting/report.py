@@ -18,6 +18,8 @@ from bcut.files.atomic import replacing, write_text
 _TEMPLATE = "report.html.j2"
 # Long tables stand in the files only.
 _ON_PAGE = 400
+# Contradictions in a message.
+_LISTED = 20
 
 _TITLES = {
     "variants": "Variants",
@@ -34,6 +36,7 @@ _TITLES = {
     "rounds": "Bound per round",
     "runs": "Runs",
     "failures": "Runs that failed",
+    "contradictions": "Contradictions",
 }
 # How columns are shown; others as they are.
 _SHARES = {"gap_closed", "least", "alone", "without", "gain_alone", "loss_without", "share"}
@@ -41,7 +44,7 @@ _TIMES = {
     "seconds", "processor_seconds", "seconds_lp", "seconds_separation", "seconds_elsewhere", "seconds_alone",
     "seconds_without", "factor", "longest",
 }  # fmt: skip
-_HIDDEN = {"fingerprint", "trace"}
+_HIDDEN = {"fingerprint", "other_fingerprint", "trace"}
 
 
 def write_report(folder: Path | str, output: Path | str | None = None) -> list[Path]:
@@ -62,7 +65,8 @@ def write_report(folder: Path | str, output: Path | str | None = None) -> list[P
     Raises
     ------
     ExperimentError
-        There is no experiment, or no run of it is stored.
+        There is no experiment, or no run of it is stored. Also where runs contradict each other: then the report
+        has been written, and says which.
     InputError
         The folder cannot be written to, or a library is missing.
     """
@@ -92,7 +96,21 @@ def write_report(folder: Path | str, output: Path | str | None = None) -> list[P
         written.append(path)
     page = target / "report.html"
     write_text(page, render(experiment, tables, drawn))
+    _refuse_contradictions(experiment, page)
     return [page, *written]
+
+
+def _refuse_contradictions(experiment: Experiment, page: Path) -> None:
+    """Raise where two claims about an optimum cannot both be true: this must not pass unseen."""
+    if not experiment.contradictions:
+        return
+    listed = [
+        f"{found.instance}, {found.second.who}: {found.told_of(found.second)}"
+        for found in experiment.contradictions[:_LISTED]
+    ]
+    more = len(experiment.contradictions) - _LISTED
+    lines = "\n".join([*listed, *([f"and {more} more"] if more > 0 else [])])
+    raise ExperimentError(f"{page}: is written, but runs contradict each other:\n{lines}")
 
 
 def _check_libraries() -> None:
@@ -146,6 +164,7 @@ def render(experiment: Experiment, tables: dict[str, Table], drawn: list[Figure]
         stored=len(experiment.runs),
         missing=experiment.missing,
         failures=experiment.failures,
+        disputes=len(experiment.contradictions),
         charts={name: chart for name, chart in charts.items() if chart},
         drawn=drawn,
         heat=_heat(experiment, tables.get("gap", [])),

@@ -9,6 +9,15 @@ from math import exp, log
 from pathlib import Path
 from typing import Any
 
+from bcut.experiments.reporting.known import (
+    Contradiction,
+    ProblemKey,
+    Stored,
+    contradictions_among,
+    problem_of,
+    proven_optimum,
+    root_lp,
+)
 from bcut.experiments.store import Store
 
 # A root LP this close to the optimum, relative to it, leaves no gap to close.
@@ -18,7 +27,7 @@ _DIGITS = 9
 _SETTLED = ("optimal", "infeasible")
 _ROOT_PRESETS = ("loop", "root")
 
-ProblemKey = tuple[str, str, str, bool, str]
+FormulatedKey = tuple[ProblemKey, str]
 
 
 @dataclass(frozen=True)
@@ -32,15 +41,18 @@ class Run:
     record : dict
         As it was stored.
     optimum : float or None
-        Of its problem.
+        Of its problem; None also where runs contradict each other.
     lp : float or None
         Root LP of its problem, without cuts.
+    disputed : bool
+        Whether runs contradict each other about its problem.
     """
 
     entry: dict[str, Any]
     record: dict[str, Any]
     optimum: float | None
     lp: float | None
+    disputed: bool = False
 
     @property
     def outcome(self) -> dict[str, Any]:
@@ -107,7 +119,13 @@ class Run:
 
     @property
     def settled(self) -> bool:
-        """Whether the run did what it is for: an optimum, or the whole gap closed."""
+        """Whether the run did what it is for: an optimum, or the whole gap closed, and no other run denies it.
+
+        At the root an outcome that is "integral" counts too, whatever that means for the preset: see
+        `bcut.experiments.presets.Run.outcome`.
+        """
+        if self.disputed:
+            return False
         if not self.is_root:
             return self.outcome["status"] in _SETTLED
         closed = self.gap_closed
@@ -127,6 +145,8 @@ class Experiment:
         Runs of the plan that are neither stored nor failed.
     failures : list of dict
         instance, variant, kind, message.
+    contradictions : list of Contradiction
+        Of runs about the same problem, or of a run and the plan.
     ledgers : dict of str to Path
         By fingerprint.
     """
@@ -135,6 +155,7 @@ class Experiment:
     runs: list[Run]
     missing: int
     failures: list[dict[str, Any]]
+    contradictions: list[Contradiction] = field(default_factory=list)
     ledgers: dict[str, Path] = field(default_factory=dict)
 
     @property
@@ -181,34 +202,35 @@ def load_experiment(folder: Path) -> Experiment:
             failures.append({"instance": entry["instance"], "variant": entry["variant"], **error["error"]})
         else:
             missing += 1
-    optima, lps = _known(stored)
-    runs = [Run(entry, record, optima.get(_key(entry)), lps.get(_key(entry))) for entry, record in stored]
-    return Experiment(manifest, runs, missing, failures, ledgers)
+    contradictions = contradictions_among(stored)
+    runs = _runs(stored, {contradiction.key for contradiction in contradictions})
+    return Experiment(manifest, runs, missing, failures, contradictions, ledgers)
 
 
-def _key(entry: dict[str, Any]) -> ProblemKey:
-    return entry["instance"], entry["objective"], entry["sense"], entry["spanning"], entry["formulation"]
-
-
-def _known(
-    stored: list[tuple[dict[str, Any], dict[str, Any]]],
-) -> tuple[dict[ProblemKey, float], dict[ProblemKey, float]]:
-    """Return optimum and root LP of each problem: as the plan says, or as some run found them."""
-    optima: dict[ProblemKey, float] = {}
-    lps: dict[ProblemKey, float] = {}
+def _runs(stored: list[Stored], disputed: set[ProblemKey]) -> list[Run]:
+    """Put beside each run what is known of its problem; nothing is measured by an optimum that is in dispute."""
+    problems: dict[FormulatedKey, list[Stored]] = {}
     for entry, record in stored:
-        key, outcome = _key(entry), record["outcome"]
-        preset = record["settings"]["preset"]
+        problems.setdefault((problem_of(entry), entry["formulation"]), []).append((entry, record))
+    known = {
+        key: (
+            None if key[0] in disputed else _optimum(together),
+            root_lp(record for _, record in together),
+        )
+        for key, together in problems.items()
+    }
+    return [
+        Run(entry, record, *known[problem_of(entry), entry["formulation"]], problem_of(entry) in disputed)
+        for entry, record in stored
+    ]
+
+
+def _optimum(stored: list[Stored]) -> float | None:
+    """Return the optimum of a problem: as the plan says, or as the first run that proved it found it."""
+    for entry, _ in stored:
         if entry["optimum"] is not None:
-            optima[key] = float(Fraction(entry["optimum"]))
-        elif preset in ("solve", "plain") and outcome["status"] == "optimal":
-            optima.setdefault(key, outcome["value"])
-        elif preset == "loop" and outcome["status"] == "integral":
-            optima.setdefault(key, outcome["lp_after_cuts"])
-        # The LP of the plain loop is the one that all variants start from.
-        if outcome["lp"] is not None and (preset == "loop" or key not in lps):
-            lps[key] = outcome["lp"]
-    return optima, lps
+            return float(Fraction(entry["optimum"]))
+    return next((found for _, record in stored if (found := proven_optimum(record)) is not None), None)
 
 
 def mean(values: Sequence[float]) -> float | None:

@@ -32,6 +32,7 @@ def all_tables(experiment: Experiment) -> dict[str, Table]:
         "measured": measured_table,
         "runs": runs_table,
         "failures": lambda found: found.failures,
+        "contradictions": lambda found: [contradiction.row() for contradiction in found.contradictions],
     }
     solving = replace(experiment, runs=[run for run in experiment.runs if not run.only_counts])
     tables = {name: make(solving) for name, make in makers.items()}

@@ -1,20 +1,24 @@
-"""A result as a few lines for people."""
+"""A result as a few lines for people, and as one."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from bcut.cli.output import table
 from bcut.objectives.syntax import BOTTLENECKS
-from bcut.result import Question, Result
+
+if TYPE_CHECKING:
+    from bcut.result import Question, Result
 
 _MEANING = {
-    "optimal": "optimal (proven)",
-    "infeasible": "infeasible: there is no such triangulation (proven)",
+    "optimal": "optimal",
+    "infeasible": "infeasible: there is no such triangulation",
     "limit": "a limit came first",
     "interrupted": "interrupted",
     "bound": "bound at the root",
 }
+
+_IN_A_WORD = {"limit": "stopped by a limit"}
 
 
 def summary(result: Result, output: Path | None = None) -> str:
@@ -45,6 +49,25 @@ def summary(result: Result, output: Path | None = None) -> str:
     if output is not None:
         rows.append(("written", str(output)))
     return head + table(rows)
+
+
+def headline(result: Result) -> str:
+    """Return what was asked and what is known, in one line without a line break."""
+    problem = result.problem
+    text = f"{result.instance.name}: {_asked(problem.objective, problem.sense)}"
+    if result.value is not None:
+        text += f" {_number(result.value)}"
+    if result.bound is not None and result.status != "optimal":
+        text += f", bound {_number(result.bound)}"
+    for asked, found in zip(problem.then, result.then, strict=False):
+        text += f", then {_asked(asked.objective, asked.sense)} {_number(found.value)}"
+    return text if result.status == "bound" else f"{text}, {_IN_A_WORD.get(result.status, result.status)}"
+
+
+def table(rows: list[tuple[str, str]], *, indent: str = "  ") -> str:
+    """Return pairs as lines in two aligned columns."""
+    width = max((len(left) for left, _ in rows), default=0)
+    return "".join(f"{indent}{left:<{width}}  {right}".rstrip() + "\n" for left, right in rows)
 
 
 def _restrictions(problem: Question) -> str:
@@ -78,7 +101,24 @@ def _number(value: float | None) -> str:
 
 def _status(result: Result) -> str:
     text = _MEANING.get(result.status, result.status)
+    if result.status in ("optimal", "infeasible"):
+        return f"{text} ({_reason(result)})"
     return text if not result.gap else f"{text}; gap {100 * result.gap:.2f} %"
+
+
+def _reason(result: Result) -> str:
+    """Say what the status rests on."""
+    from bcut.separation.resolve import is_built_in
+
+    certificates = [result.certificate, *(level.certificate for level in result.then)]
+    unsettled = [certificate for certificate in certificates if certificate.settles is None]
+    if not unsettled:
+        exact = all(certificate.settles == "exactly" for certificate in certificates)
+        return "proven exactly" if exact else "proven within a relative gap of 1e-9"
+    foreign = [name for name in result.problem.separators if not is_built_in(name)]
+    if foreign:
+        return f"if the cuts of {', '.join(foreign)} are valid: they were not checked"
+    return unsettled[0].reason or "the last step rests on the solver's search"
 
 
 def _separators(result: Result) -> list[tuple[str, str]]:

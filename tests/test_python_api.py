@@ -1,0 +1,483 @@
+"""What the library is handed, and what it hands back: points, functions, wrong arguments, texts, files read again."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import json
+import pickle
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bcut
+from bcut.cli.main import run
+from bcut.errors import InputError, ObjectiveError, ResultError, SeparatorLoadError
+from bcut.geometry.configuration import PointConfiguration
+from bcut.objectives.syntax import FunctionText, objective_text, read_level, read_objective
+from bcut.separation.cases import CASES, case
+from bcut.solving.arguments import _ACCEPTED
+from bcut.solving.region import RegionResult
+
+Captured = pytest.CaptureFixture[str]
+
+SQUARE = [[0, 0], [1, 0], [0, 1], [1, 1]]
+
+
+class Table:
+    """What other libraries have: not an array, but willing to become one."""
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+        return np.array(SQUARE, dtype=dtype)
+
+
+def perimeter(points: Any) -> Any:
+    k = points.shape[1]
+    return sum(np.linalg.norm(points[:, i] - points[:, j], axis=1) for i in range(k) for j in range(i))
+
+
+# Points.
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        SQUARE,
+        tuple(map(tuple, SQUARE)),
+        [["0", 0], [1.0, Fraction(0)], np.array([0, 1]), (np.int8(1), "2/2")],
+        np.array(SQUARE),
+        np.array(SQUARE, dtype=np.float32),
+        Table(),
+    ],
+    ids=["lists", "tuples", "mixed", "integers", "floats", "table"],
+)
+def test_points_are_instances(points: Any, tmp_path: Path) -> None:
+    expected = PointConfiguration.from_values(SQUARE)
+    assert bcut.load_instance(points) == expected
+    assert bcut.solve(points).value == bcut.bound(points).bound == 2
+    assert bcut.info(points).digest == expected.digest
+    bcut.export(points, tmp_path / "model.lp")
+    assert "x_0_1_2" in (tmp_path / "model.lp").read_text()
+
+
+def test_a_configuration_is_its_own_instance() -> None:
+    configuration = PointConfiguration.from_values(SQUARE, name="square")
+    assert bcut.load_instance(configuration) is configuration
+
+
+def test_random_points_are_the_family_of_that_name() -> None:
+    points = np.random.default_rng(0).random((8, 2))
+    assert bcut.load_instance(points) == bcut.load_instance("random:8,2,seed=0")
+    assert bcut.solve(points).value == bcut.solve("random:8,2,seed=0").value
+
+
+@pytest.mark.parametrize("call", [bcut.solve, bcut.bound, bcut.info, bcut.load_instance])
+@pytest.mark.parametrize("thing", [None, 5, {"points": SQUARE}, {(0, 0), (1, 0), (0, 1)}, object()])
+def test_anything_else_is_refused(call: Callable[[Any], object], thing: Any) -> None:
+    with pytest.raises(
+        InputError, match=rf"an instance is a family .* shape \(n, d\).*, not {type(thing).__name__}"
+    ):
+        call(thing)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([], "there are no points"),
+        ([1, 2, 3], "point 0 .* is 1, not a list of coordinates"),
+        (["cube:3"], "not a list of coordinates"),
+        (np.zeros(3), r"an array of shape \(3,\) holds no points"),
+        (b"cube:3", "points must be a list of coordinate lists, not bytes"),
+        ([[0, 0], [1, 0], [0, None]], "coordinate 1 of point 2"),
+    ],
+)
+def test_points_that_are_none_are_refused(points: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        bcut.load_instance(points)
+
+
+# Arguments.
+
+
+def test_every_argument_is_read() -> None:
+    parameters = {
+        *inspect.signature(bcut.solve).parameters,
+        *inspect.signature(bcut.bound).parameters,
+        *inspect.signature(bcut.export).parameters,
+    }
+    assert parameters - {"instance", "path"} == set(_ACCEPTED) - {"only_bound"}
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "message"),
+    [
+        ("objective", 5, "objective 5: give a measure such as 'weight', a function"),
+        ("objective", ["weight"], "give a measure"),
+        ("objective", ("max-min", "weight"), "give a measure"),
+        ("objective", ("max", perimeter), "in front of a function stands min-max or max-min"),
+        ("sense", 1, "sense=1: give 'min' or 'max'"),
+        ("then", 5, r"then=5: give a list of objectives, such as \['cardinality', 'max:weight'\]"),
+        ("then", [5], "objective 5"),
+        ("then", [("best", perimeter)], "in front of a function"),
+        ("formulation", 7, "unknown formulation '7': known are 0, 1, 2, chambers"),
+        ("formulation", "", "unknown formulation ''"),
+        ("formulation", 2.0, "formulation=2.0: give '0', '1', '2' or 'chambers'"),
+        ("formulation", True, "formulation=True"),
+        ("spanning", "no", "spanning='no': give True or False"),
+        ("spanning", 1, "spanning=1"),
+        ("dissection", None, "dissection=None: give True or False"),
+        ("require", 5, r"require=5: give a list of faces, .* such as \[\[0, 1, 4\]\]"),
+        ("require", [0, 1], r"require=\[0, 1\]: give a list of faces"),
+        ("forbid", "0,1", "forbid='0,1': give a list of faces"),
+        ("forbid", [["a"]], r"forbid \['a'\]: name points by their numbers"),
+        ("star", "a", "star='a': give the number of a point"),
+        ("star", 1.5, "star=1.5"),
+        ("separators", 5, "separators=5: give a list of separators"),
+        ("separators", "clik", "unknown separator 'clik': did you mean"),
+        ("time_limit", "5", "time_limit='5': give a number of seconds"),
+        ("time_limit", True, "time_limit=True"),
+        ("memory_limit", "1 GB", "memory_limit='1 GB': give a number of GiB"),
+        ("seed", None, "seed=None: give an integer that is not negative"),
+        ("seed", 1.5, "seed=1.5"),
+        ("seed", True, "seed=True"),
+        ("method", None, "method=None: give the name of a method"),
+        ("symmetries", 5, r"symmetries=5: give the path of a file, or a list of permutations"),
+        ("symmetries", [5], r"symmetries=\[5\]"),
+        ("symmetries", [[1.0, 0.0]], r"symmetries=\[\[1.0, 0.0\]\]"),
+        ("invariant_under", 2.5, "invariant_under=2.5: give the order of a group, the path"),
+        ("on_progress", 5, "on_progress=5: give a function that takes a dict"),
+        ("cut_observer", 5, "cut_observer=5: give an object with the methods relaxed, separated and took"),
+        ("cut_observer", print, "cut_observer="),
+    ],
+)
+def test_arguments_of_the_wrong_type_are_refused_by_name(argument: str, value: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        bcut.solve("cube:2", **{argument: value})
+
+
+def test_long_values_are_cut_short_in_messages() -> None:
+    with pytest.raises(InputError) as refused:
+        bcut.solve("cube:2", seed=list(range(10_000)))  # type: ignore[arg-type]
+    assert len(str(refused.value)) < 200
+
+
+@pytest.mark.parametrize("call", [bcut.verify, bcut.regular, lambda thing: bcut.plot(thing, "a.png")])
+@pytest.mark.parametrize("thing", [3, None, SQUARE])
+def test_what_is_no_result_is_refused(call: Callable[[Any], object], thing: Any) -> None:
+    with pytest.raises(ResultError, match=f"a result is the path .*, not {type(thing).__name__}"):
+        call(thing)
+
+
+@pytest.mark.parametrize("thing", [5, SQUARE, (SQUARE, [], [])])
+def test_what_is_no_region_is_refused(thing: Any) -> None:
+    with pytest.raises(InputError, match=r"a region is a file with faces, .*\(points, triangles\)"):
+        bcut.region(thing)
+    with pytest.raises(InputError, match="time_limit='5'"):
+        bcut.region("schoenhardt", time_limit="5")  # type: ignore[arg-type]
+
+
+def test_export_refuses_as_solve_does(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="spanning='no'"):
+        bcut.export("cube:2", tmp_path / "model.lp", spanning="no")  # type: ignore[arg-type]
+    bcut.export("cube:2", tmp_path / "model.lp", formulation=2)
+    assert (tmp_path / "model.lp").exists()
+
+
+@pytest.mark.parametrize("formulation", [0, 1, 2, np.int64(2)])
+def test_formulations_may_be_numbers(formulation: Any) -> None:
+    result = bcut.solve("cube:2", formulation=formulation)
+    assert result.problem.formulation == str(int(formulation))
+    assert result.value == 2
+
+
+def test_numbers_of_numpy_become_plain() -> None:
+    result = bcut.solve(
+        "cube:2",
+        seed=np.int64(3),
+        star=np.int8(2),
+        time_limit=np.float32(9),
+        memory_limit=np.int64(100),
+        spanning=np.True_,
+        require=np.array([[0, 1]]),
+        then=np.array(["max:weight"]),
+    )
+    data = json.loads(result.to_json())["problem"]
+    assert (data["seed"], data["star"], data["spanning"], data["require"]) == (3, 2, True, [[0, 1]])
+    assert data["limits"] == {"time": 9.0, "memory": 100}
+    assert [level["objective"] for level in data["then"]] == ["weight"]
+    assert bcut.verify(json.loads(result.to_json())).value == 2
+
+
+def test_what_is_one_may_stand_alone() -> None:
+    alone = bcut.solve("cube:3", separators="clique", then="max:weight")
+    listed = bcut.solve("cube:3", separators=["clique"], then=["max:weight"])
+    assert alone.problem == listed.problem
+    assert alone.problem.separators == ["clique"]
+    assert alone.then[0].value == listed.then[0].value
+    assert bcut.bound("cube:3", separators="clique").problem.separators == ["clique"]
+    with pytest.raises(SeparatorLoadError, match="link,clique"):
+        bcut.solve("cube:3", separators="link,clique")
+
+
+# Functions as objectives.
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.py"
+    path.write_text(f"import numpy as np\nfrom typing import Any\n\n{inspect.getsource(perimeter)}")
+    return path
+
+
+@pytest.mark.parametrize("prefix", [None, "min-max", "max-min"])
+def test_a_function_is_worth_what_its_file_is(prefix: str | None, file: Path, tmp_path: Path) -> None:
+    objective = perimeter if prefix is None else (prefix, perimeter)
+    found = bcut.solve("random:8,2,seed=1", objective=objective)
+    from_file = bcut.solve("random:8,2,seed=1", objective=f"{prefix or ''}:{file}".lstrip(":"))
+    assert found.status == "optimal"
+    assert (found.value, found.bound) == (from_file.value, from_file.bound)
+    assert found.triangulation == from_file.triangulation
+    assert found.problem.costs == from_file.problem.costs
+    assert found.problem.objective == (f"{prefix}:" if prefix else "") + "python:perimeter"
+    found.save(tmp_path / "result.json")
+    # The table of costs is in the file, so that the function is not called again.
+    verified = bcut.verify(tmp_path / "result.json")
+    assert verified.value == pytest.approx(found.value)
+    assert verified.exact_bound == pytest.approx(found.value)
+
+
+def test_a_function_may_decide_among_the_best() -> None:
+    best = bcut.solve("random:8,2,seed=1", then=[("max", perimeter)])
+    worst = bcut.solve("random:8,2,seed=1", then=perimeter)
+    assert best.value == worst.value
+    assert best.then[0].value > worst.then[0].value  # type: ignore[operator]
+    for result, sense in ((best, "max"), (worst, "min")):
+        level = result.problem.then[0]
+        assert (level.objective, level.sense) == ("python:perimeter", sense)
+        assert bcut.verify(result.to_dict()).further[0].value == pytest.approx(result.then[0].value)
+
+
+def test_functions_of_one_name_are_not_mixed_up() -> None:
+    first, second = (lambda points: points[:, 0, 0]), (lambda points: points[:, 0, 1])
+    assert objective_text(first) == objective_text(second)  # type: ignore[arg-type]
+    values = [
+        bcut.solve("random:8,2,seed=1", objective=function).value for function in (first, second, first)
+    ]
+    assert values[0] == values[2] != values[1]
+
+
+def test_a_function_may_be_bounded_and_exported(tmp_path: Path) -> None:
+    result = bcut.bound("random:8,2,seed=1", objective=perimeter)
+    assert result.bound == pytest.approx(bcut.solve("random:8,2,seed=1", objective=perimeter).value)
+    bcut.export("random:8,2,seed=1", tmp_path / "model.lp", objective=perimeter)
+    with pytest.raises(InputError, match="a model file takes sums only; write python:perimeter"):
+        bcut.export("random:8,2,seed=1", tmp_path / "model.lp", objective=("max-min", perimeter))
+
+
+def test_what_a_function_does_wrong_is_told_as_its_own() -> None:
+    with pytest.raises(
+        ObjectiveError, match=r"'python:.*<lambda>': <lambda>\(\) raised ZeroDivisionError"
+    ) as raised:
+        bcut.solve("cube:2", objective=lambda points: 1 / 0)
+    assert "ZeroDivisionError" in raised.value.trace
+    with pytest.raises(ObjectiveError, match=r"returned an array of shape \(\) for 4 simplices"):
+        bcut.solve("cube:2", objective=lambda points: 1)
+
+
+def test_a_name_alone_is_no_function(capsys: Captured) -> None:
+    with pytest.raises(
+        InputError, match=r"'python:perimeter' .* only the name is known here; .* ./mine.py:perimeter"
+    ):
+        bcut.solve("cube:2", objective="python:perimeter")
+    assert run(["solve", "cube:2", "--objective", "min-max:python:perimeter"]) == 2
+    assert "only the name is known here" in capsys.readouterr().err
+
+
+def test_the_text_of_a_function_carries_it_and_is_plain_in_copies() -> None:
+    text = FunctionText.of(perimeter, "max-min")
+    name = read_objective(text)
+    assert (name.text, name.measure, name.sense) == ("max-min:python:perimeter", "python:perimeter", "max")
+    assert isinstance(name.measure, FunctionText)
+    assert name.measure.function is perimeter
+    level = read_level(("max", perimeter))
+    assert (level.text, level.sense) == ("python:perimeter", "max")
+    assert isinstance(level.measure, FunctionText)
+    for copied in (copy.deepcopy(text), pickle.loads(pickle.dumps(text)), str(text)):
+        assert type(copied) is str
+        assert copied == text
+
+
+# Texts.
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: bcut.solve("cube:4"), "<Result cube:4: min cardinality 16, optimal>"),
+        (lambda: bcut.bound("cube:3"), "<Result cube:3: min cardinality, bound 5>"),
+        (
+            lambda: bcut.solve("cube:3", objective="max-min:volume", then=["cardinality"]),
+            "<Result cube:3: max-min:volume 0.1666666667, then min cardinality 5, optimal>",
+        ),
+        (
+            lambda: bcut.solve("moae", require=[[0, 4], [1, 5], [2, 3]], forbid=[[0, 1]]),
+            "<Result moae: min cardinality, infeasible>",
+        ),
+        (lambda: bcut.load_instance("cube:4"), "<PointConfiguration cube:4: 16 points in dimension 4>"),
+        (
+            lambda: bcut.region("schoenhardt"),
+            "<RegionResult schoenhardt: volume 866000000, covered 0, infeasible>",
+        ),
+        (lambda: bcut.regular(bcut.solve("cube:4")), "<Regularity: regular, by 16 heights>"),
+    ],
+)
+def test_short_texts(call: Callable[[], object], text: str) -> None:
+    assert repr(call()) == text
+
+
+def test_the_value_at_a_limit_stands_beside_its_bound() -> None:
+    result = bcut.solve("cube:3")
+    result.status, result.value, result.bound = "limit", 6, 5
+    assert repr(result) == "<Result cube:3: min cardinality 6, bound 5, stopped by a limit>"
+
+
+def test_nothing_prints_pages() -> None:
+    result = bcut.solve("random:12,3,seed=1", objective=perimeter, separators=["clique", "link"])
+    problem = case(CASES[3]).problem
+    point = bcut.FractionalPoint(problem, np.full(len(problem.simplices), 0.5))
+    verified = bcut.verify(result)
+    parts = (result.instance, result.problem, result.root, result.size, result.certificate)
+    for thing in (result, *parts, problem, problem.formulation, point, verified, bcut.regular(result)):
+        assert len(repr(thing)) < 1000
+        assert "\n" not in repr(thing)
+    assert len(str(result).splitlines()) < 20
+    assert repr(problem) == "<Problem of polygon:7: 35 simplices>"
+    assert repr(point) == "<FractionalPoint of polygon:7: 35 of 35 simplices in its support, 35 fractional>"
+    assert verified.statement in repr(verified)
+    assert "digest=" in repr(result.instance)
+
+
+def test_a_result_reads_as_on_the_command_line(capsys: Captured, tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    assert run(["solve", "cube:3", "--then", "max:weight", "--output", str(path)]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed.pop().split() == ["written", str(path)]
+    assert str(bcut.Result.load(path)).splitlines() == printed
+    assert run(["region", "schoenhardt", "--output", str(path)]) == 0
+    *printed, written = capsys.readouterr().out.splitlines()
+    assert written == f"written to {path}"
+    assert str(RegionResult.load(path)).splitlines() == printed
+
+
+# Results read again.
+
+
+@pytest.mark.parametrize(
+    ("instance", "options"),
+    [
+        ("cube:4", {}),
+        ("cube:4", {"method": "orbits"}),
+        ("cube:3", {"method": "scip"}),
+        ("cube:3", {"method": "orbits", "invariant_under": 2}),
+        ("cube:4", {"time_limit": 0}),
+        ("random:9,2,seed=1", {"then": [perimeter], "separators": ["clique", "odd-cycle"]}),
+        ("random:10,2,seed=4", {"objective": "max-min:min-angle"}),
+        ("random:30,2,seed=1", {"spanning": True, "objective": "weight", "method": "elimination"}),
+        ("random:12,3,seed=1000", {"spanning": True, "separators": ["clique", "parity", "link"]}),
+        ("random:12,3,seed=1000", {"spanning": True, "objective": "weight", "method": "fixing"}),
+        ("moae", {"require": [[0, 4], [1, 5], [2, 3]], "forbid": [[0, 1]]}),
+        ("moae", {"spanning": True, "dissection": True}),
+    ],
+)
+def test_a_result_is_read_back_as_it_was(instance: str, options: dict[str, Any], tmp_path: Path) -> None:
+    result = bcut.solve(instance, **options)
+    path = tmp_path / "result.json"
+    result.save(path)
+    for source in (path, str(path), result.to_dict()):
+        loaded = bcut.Result.load(source)
+        assert loaded == result
+        assert loaded.to_dict() == result.to_dict()
+        assert loaded.to_json() == path.read_text()
+    assert repr(loaded) == repr(result)
+    assert bcut.verify(loaded).statement == bcut.verify(result).statement
+
+
+def test_a_bound_and_a_region_are_read_back() -> None:
+    result = bcut.bound("cube:3")
+    assert bcut.Result.load(result.to_dict()) == result
+    region = bcut.region("schoenhardt")
+    assert RegionResult.load(region.to_dict()) == region
+
+
+def test_what_was_read_is_a_copy() -> None:
+    data = bcut.solve("cube:3").to_dict()
+    loaded = bcut.Result.load(data)
+    assert loaded.triangulation is not None
+    loaded.triangulation.clear()
+    loaded.certificate.multipliers = None
+    assert data["triangulation"]
+    assert data["certificate"]["multipliers"]
+
+
+def test_entries_that_older_files_lack_have_their_defaults() -> None:
+    data = bcut.solve("cube:3").to_dict()
+    del data["problem"]["then"], data["then"], data["problem"]["star"]
+    assert bcut.Result.load(data).problem.then == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("data.clear()", "has no entry 'schema'; take the file as"),
+        ("data['schema'] = 2", "has schema 2, but this version of bcut reads schema 1"),
+        ("del data['instance']", "has no entry 'instance'"),
+        ("del data['problem']['sense']", "has no entry 'problem.sense'"),
+        ("data['instance'] = []", r"'instance': this is a JSON object, not \[\]"),
+        ("data['status'] = 'fine'", "'status': this is one of optimal, infeasible, .*, not \"fine\""),
+        ("data['nodes'] = 'many'", "'nodes': this is an integer, not \"many\""),
+        ("data['nodes'] = True", "'nodes': this is an integer, not true"),
+        ("data['value'] = '5'", "'value': this is a number, not \"5\""),
+        ("data['problem']['spanning'] = 0", "'problem.spanning': this is true or false, not 0"),
+        ("data['triangulation'][1][0] = 0.5", r"'triangulation\[1\]\[0\]': this is an integer, not 0.5"),
+        ("data['triangulation'] = {}", "'triangulation': this is a list"),
+        ("data['seconds']['total'] = None", "'seconds.total': this is a number, not null"),
+        ("data['seconds'] = []", "'seconds': this is a JSON object"),
+        ("data['root']['rounds'] = [3]", r"'root.rounds\[0\]': this is a JSON object, not 3"),
+        (
+            "data['certificate']['colour'] = 1",
+            "'certificate.colour', which this version of bcut does not know",
+        ),
+        ("data['kind'] = 'region'", "is not about a triangulation"),
+    ],
+)
+def test_what_is_no_result_file_is_refused(change: str, message: str, tmp_path: Path) -> None:
+    data = json.loads(bcut.solve("cube:3").to_json())
+    exec(change, {"data": data})
+    path = tmp_path / "result.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(ResultError, match=message) as refused:
+        bcut.Result.load(path)
+    assert str(refused.value).startswith(f"result file {path}: ")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "there is no such file"),
+        ("{", "is not JSON"),
+        ("[]", "a result is a JSON object"),
+        ("NaN", "no number"),
+    ],
+)
+def test_files_that_hold_no_result_are_refused(content: str | None, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(ResultError, match=message):
+        bcut.Result.load(path)
+    with pytest.raises(ResultError, match="is not about a region"):
+        RegionResult.load(bcut.solve("cube:2").to_dict())
