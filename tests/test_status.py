@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -198,3 +202,39 @@ def test_ctrl_c_while_simplices_are_listed_promises_nothing_that_was_asked_for(a
 def test_ctrl_c_while_a_bound_has_no_program_yet(method: str) -> None:
     result = bcut.bound("cube:4", method=method)
     assert (result.status, result.bound, result.triangulation) == ("interrupted", None, None)
+
+
+def test_ctrl_c_in_the_first_separation_keeps_the_relaxation() -> None:
+    def interrupt(point: FractionalPoint) -> Iterator[Cut]:
+        raise KeyboardInterrupt
+        yield
+
+    result = bcut.bound(**FRACTIONAL, separators=[Scripted(interrupt, "mine")])
+    assert (result.status, result.bound) == ("interrupted", 17)
+    assert result.root.lp == pytest.approx(16.5)
+    assert verify(result.to_dict()).rounded_bound == 17
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
+def test_a_request_to_end_keeps_what_was_found(tmp_path: Path) -> None:
+    (tmp_path / "slow.py").write_text(
+        "import time, pathlib\n"
+        "from bcut import Separator\n\n\n"
+        "class Slow(Separator):\n"
+        "    name = 'slow'\n\n"
+        "    def separate(self, point):\n"
+        "        pathlib.Path('asked').touch()\n"
+        "        time.sleep(60)\n"
+        "        return []\n"
+    )
+    command = [sys.executable, "-P", "-m", "bcut", "solve", FRACTIONAL["instance"], "--spanning"]
+    command += ["--separator", "./slow.py", "--output", "found.json"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        while not (tmp_path / "asked").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 130
+    result = json.loads((tmp_path / "found.json").read_text())
+    assert (result["status"], result["bound"]) == ("interrupted", 17)
+    verify(result)

@@ -221,7 +221,9 @@ ALL_TRIANGLES = [
 @pytest.mark.parametrize("bound", ["0", 0.0, 3.9e-12, "-1/1000000000000"])
 def test_small_costs_do_not_make_values_optimal(bound: Any, costs: dict[str, Any]) -> None:
     assert verify({**tiny_grid(bound, **costs), "status": "limit"}).value == Fraction(4, 10**12)
-    with pytest.raises(VerificationError, match=r"'optimal', but its bound .* leaves room for a better value"):
+    with pytest.raises(
+        VerificationError, match=r"'optimal', but its bound .* leaves room for a better value"
+    ):
         verify(tiny_grid(bound, **costs))
     turned = tiny_grid(bound, **costs)
     turned["problem"]["sense"] = "max"

@@ -130,11 +130,12 @@ class _Loop:
         separation: Separation | None,
         limits: RootLimits,
         on_round: Callable[[Round], None] | None,
+        on_relaxed: Callable[[RootBound], None] | None,
         cuts: Sequence[IntegerCut],
     ) -> None:
         self.relaxation = Relaxation(formulation, objective, deadline=limits.deadline)
         self.relaxation.add(cuts)
-        self.limits, self.on_round = limits, on_round
+        self.limits, self.on_round, self.on_relaxed = limits, on_round, on_relaxed
         self.result = RootBound(np.arange(len(formulation.simplices)), separation)
         self.slack_for: dict[tuple[bytes, bytes, int], int] = {}
         self.stalled = 0
@@ -193,6 +194,8 @@ class _Loop:
         if result.last is None or bound.value >= result.last.value:
             result.last = bound
             self.best = Stage(self.relaxation.formulation, bound, tuple(self.relaxation.cuts))
+        if self.on_relaxed is not None:
+            self.on_relaxed(result)
         size = self.relaxation.objective.largest_cost
         moved = previous is None or abs(point.value - previous) > self.limits.stall * max(size, abs(previous))
         self.stalled = 0 if moved else self.stalled + 1
@@ -282,6 +285,7 @@ def root_bound(
     *,
     limits: RootLimits | None = None,
     on_round: Callable[[Round], None] | None = None,
+    on_relaxed: Callable[[RootBound], None] | None = None,
     cuts: Sequence[IntegerCut] = (),
 ) -> RootBound:
     """Bound the optimum by the linear relaxation and cuts.
@@ -295,6 +299,8 @@ def root_bound(
     limits : RootLimits, optional
     on_round : callable, optional
         Told of every finished round.
+    on_relaxed : callable, optional
+        Told of what is known when a relaxation is solved, before it is separated: separators may take long, or fail.
     cuts : sequence of IntegerCut
         Known already: they are in the relaxation from the start.
 
@@ -302,4 +308,4 @@ def root_bound(
     -------
     RootBound
     """
-    return _Loop(formulation, objective, separation, limits or RootLimits(), on_round, cuts).run()
+    return _Loop(formulation, objective, separation, limits or RootLimits(), on_round, on_relaxed, cuts).run()

@@ -195,9 +195,26 @@ def bound_at_root(
         search.lp_after_cuts = finished.lp
         search.report("root", lp=finished.lp, cuts=sum(finished.cuts.values()))
 
+    def on_relaxed(known: RootBound) -> None:
+        # What is kept if separation does not come to an end. Parts, and targets, say nothing of the whole.
+        if part is not search.whole or target is not None:
+            return
+        if search.lp is None:
+            search.lp = known.lp
+        search.lp_after_cuts, search.exact = known.lp_after_cuts, known.first
+        if known.last is not None:
+            search.raise_bound(known.last.value)
+
     limits = RootLimits(deadline=search.deadline, target=target)
     with search.timed("root"):
-        root = root_bound(part.formulation, part.objective, separation, limits=limits, on_round=on_round)
+        root = root_bound(
+            part.formulation,
+            part.objective,
+            separation,
+            limits=limits,
+            on_round=on_round,
+            on_relaxed=on_relaxed,
+        )
     search.root_is_integral = root.status == "integral"
     if root.status == "integral" and root.point is not None:
         search.offer(part.columns[root.columns[root.point > 0.5]])

@@ -69,7 +69,9 @@ def _bound_statement(data: ResultData, best: Fraction | None, certified: Certifi
     if best is not None:
         proven = f"bound {shown(best)} proven exactly"
         if certified is not None and certified.obstacle:
-            return f"{proven}; what its certificate proves beyond that was not re-checked: {certified.obstacle}"
+            return (
+                f"{proven}; what its certificate proves beyond that was not re-checked: {certified.obstacle}"
+            )
         return proven
     if certified is not None:
         return f"the bound of its certificate was not re-checked: {certified.obstacle}"
