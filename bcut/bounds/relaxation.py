@@ -1,4 +1,4 @@
-"""The linear relaxation of a formulation in HiGHS, with cuts that come and go. The only place that imports highspy."""
+"""The linear relaxation of a formulation in HiGHS, with cuts that come and go."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Relaxation:
 
         Raises
         ------
-        InfeasibleRelaxation
+        InfeasibleRelaxationError
             If no point satisfies all rows and cuts.
         SolverError
             If HiGHS fails.
