@@ -393,21 +393,29 @@ def test_ctrl_c_in_any_stage_keeps_what_was_found(method: str, stage: str, tmp_p
 
 
 def test_ctrl_c_from_outside_keeps_what_was_found(tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    # Its cardinality is out of reach in seconds without separators.
-    arguments = [
-        "solve",
-        "random:30,3,seed=0",
-        "--spanning",
-        "--no-separators",
-        "--json",
-        "--output",
-        str(file),
-    ]
+    file, asked = tmp_path / "result.json", tmp_path / "asked"
+    # It tells that the solve is under way, however slow the machine is, and nothing else.
+    (tmp_path / "tells.py").write_text(
+        "from pathlib import Path\n"
+        "from bcut import Separator\n\n\n"
+        "class Tells(Separator):\n"
+        "    name = 'tells'\n\n"
+        "    def separate(self, point):\n"
+        f"        Path({str(asked)!r}).touch()\n"
+        "        return []\n"
+    )
+    # Its cardinality is out of reach in seconds without cuts.
+    arguments = ["solve", "random:30,3,seed=0", "--spanning", "--separator", str(tmp_path / "tells.py")]
     with subprocess.Popen(
-        [*COMMAND, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*COMMAND, *arguments, "--json", "--output", str(file)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
-        time.sleep(4)
+        while not asked.exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=120)
     check_interrupted(process.returncode, out, err, file)

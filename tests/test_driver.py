@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
+import json
+import time
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Any
 
@@ -16,6 +19,7 @@ from oracles import Scripted, Watching, at_work
 from bcut.errors import SeparatorError, SeparatorLoadError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.instance import load_instance
+from bcut.separation import calls
 from bcut.separation.driver import (
     MAX_COEFFICIENT,
     FamilyStatistics,
@@ -227,6 +231,170 @@ def test_a_separator_that_raises_in_setup_is_named() -> None:
     ) as caught:
         at_work(FORMULATION, FailsInSetup())
     assert "fail_in_a_helper" in caught.value.trace
+
+
+def test_a_traceback_begins_with_the_separator_s_own_lines() -> None:
+    with pytest.raises(SeparatorError) as caught:
+        at_work(FORMULATION, Scripted(fails_late)).round(HALVES)
+    first = caught.value.trace.splitlines()[1]
+    assert "oracles.py" in first or "test_driver.py" in first
+    assert "driver.py\", line" not in caught.value.trace.replace("test_driver.py", "")
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (None, r"separate\(\) returned None; yield Cuts or return a list of them"),
+        (42, r"separate\(\) returned int 42; yield Cuts"),
+        (Cut([0], 0), r"separate\(\) returned Cut Cut\(.*; yield Cuts"),
+        ([None], r"separate\(\) must yield Cut objects, not None; write Cut\(simplices, rhs\)"),
+        ([([0, 1], 1)], r"separate\(\) must yield Cut objects, not tuple \(\[0, 1\], 1\); write Cut"),
+        ("clique", r"separate\(\) must yield Cut objects, not str 'c'; write Cut"),
+        ([Cut([-1], 0)], r"must be distinct columns from 0 to 19, not list \[-1\]"),
+        ([Cut([[0], [1, 2]], 0)], r"must be a non-empty list of columns, not list \[\[0\], \[1, 2\]\]"),
+        ([Cut([0, 1], 0, 3)], "coefficients must be a list of numbers, or left out, not int 3"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_no_cut_is_said_without_a_traceback(returned: Any, message: str) -> None:
+    with pytest.raises(SeparatorError, match=f"separator 'scripted': .*{message}") as caught:
+        at_work(FORMULATION, Scripted(lambda point: returned)).round(HALVES)
+    assert caught.value.trace == ""
+
+
+def test_a_proof_becomes_plain_data() -> None:
+    proof = {
+        "clique": np.array([3, 4]),
+        "weights": (np.float64(0.5), np.int64(2), Fraction(3, 2), np.bool_(True), None),
+        "nested": {np.int64(7): [[np.float32(1.5)], "text"], 1: {}},
+    }
+    cut = to_integers(Cut([0, 1], 1, proof=proof), "x", COUNT)
+    plain = {
+        "clique": [3, 4],
+        "weights": [0.5, 2, "3/2", True, None],
+        "nested": {"7": [[1.5], "text"], "1": {}},
+    }
+    assert cut.proof == plain
+    assert json.loads(json.dumps(cut.proof, allow_nan=False)) == plain
+
+
+def test_no_proof_is_an_empty_one() -> None:
+    assert to_integers(Cut([0, 1], 1, proof=None), "x", COUNT).proof == {}  # type: ignore[arg-type]
+    assert to_integers(Cut([0, 1], 1), "x", COUNT).proof == {}
+
+
+def holding_itself() -> list[Any]:
+    proof: list[Any] = []
+    proof.append(proof)
+    return proof
+
+
+@pytest.mark.parametrize(
+    ("proof", "message"),
+    [
+        ([1, 2], r"must be a mapping such as .*, or left out, not list \[1, 2\]"),
+        ("clique", "must be a mapping such as .*, or left out, not str 'clique'"),
+        ({"members": {3}}, r"holds set \{3\} under 'members'; a proof is JSON-ready data"),
+        ({"weights": [1.0, float("nan")]}, "holds the number nan under 'weights'"),
+        ({"weights": np.array([np.inf])}, "holds the number inf under 'weights'"),
+        ({"z": 1j}, "holds complex 1j under 'z'"),
+        ({"when": np.datetime64("2000-01-01")}, "holds datetime64 .* under 'when'"),
+        ({(0, 1): 2}, r"holds the key tuple \(0, 1\) under \(0, 1\)"),
+        ({"faces": {None: 2}}, "holds the key NoneType None under 'faces'"),
+        ({"faces": holding_itself()}, "is nested too deeply under 'faces', or holds itself"),
+    ],
+)
+def test_a_proof_that_json_does_not_hold_is_refused(proof: Any, message: str) -> None:
+    with pytest.raises(SeparatorError, match=f"separator 'scripted': a cut's proof {message}") as caught:
+        at_work(FORMULATION, one(Cut([0, 1, 2], 1, proof=proof))).round(HALVES)
+    assert caught.value.trace == ""
+
+
+class Endless:
+    """Yields cuts for ever, and notes whether it was closed."""
+
+    def __init__(self, *cuts: Cut, seconds: float = 0.0) -> None:
+        self.cuts, self.seconds = cuts, seconds
+        self.yielded, self.closed = 0, False
+
+    def __call__(self, point: FractionalPoint) -> Iterator[Cut]:
+        try:
+            while True:
+                yield self.cuts[self.yielded % len(self.cuts)]
+                self.yielded += 1
+                time.sleep(self.seconds)
+        finally:
+            self.closed = True
+
+
+@pytest.mark.parametrize("rhs", [0, 100], ids=["violated", "satisfied"])
+def test_a_separator_that_does_not_end_is_named_after_so_many_cuts(
+    monkeypatch: pytest.MonkeyPatch, rhs: int
+) -> None:
+    monkeypatch.setattr(calls, "MAX_CUTS", 1000)
+    script = Endless(Cut([0, 1], rhs))
+    message = r"separator 'scripted': separate\(\) yielded more than 1,000 cuts for one point and was stopped"
+    with pytest.raises(calls.EndlessSeparatorError, match=message) as caught:
+        at_work(FORMULATION, Scripted(script)).round(HALVES)
+    assert script.yielded == 1000
+    assert script.closed
+    assert caught.value.exit_status == 5
+
+
+def test_long_cuts_without_end_are_stopped_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calls, "MAX_COEFFICIENTS", 1000)
+    script = Endless(Cut(list(range(COUNT)), 0))
+    with pytest.raises(calls.EndlessSeparatorError, match="more than 1,000 coefficients for one point"):
+        at_work(FORMULATION, Scripted(script)).round(HALVES)
+    assert script.yielded == 1000 // COUNT
+
+
+def test_as_many_cuts_as_are_allowed_are_fine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calls, "MAX_CUTS", 3)
+    assert len(added_by(Cut([0, 1], 0), Cut([2], 0), Cut([3, 4, 5], 0))) == 3
+
+
+def test_the_deadline_ends_a_round_and_keeps_the_cuts_so_far() -> None:
+    script, later = Endless(Cut([0, 1], 0), Cut([2, 3], 0), seconds=0.01), Watching()
+    separation = Separation(
+        [Scripted(script), later], Problem(FORMULATION), deadline=time.monotonic() + 0.2
+    )
+    started = time.monotonic()
+    cuts = separation.round(HALVES)
+    assert time.monotonic() - started < 5
+    assert [cut.columns.tolist() for cut in cuts] == [[0, 1], [2, 3]]
+    assert separation.cut_short
+    assert script.closed
+    assert later.points == []
+    assert separation.statistics["watching"].calls == 0
+    smaller = separation.restricted_to(np.arange(10))
+    assert smaller.round(HALVES[:10]) == []
+    assert smaller.cut_short
+
+
+def test_without_a_deadline_that_has_passed_no_round_is_cut_short() -> None:
+    for deadline in (None, time.monotonic() + 3600):
+        separation = Separation([one(Cut([0, 1], 5))], Problem(FORMULATION), deadline=deadline)
+        assert separation.round(HALVES) == []
+        assert not separation.cut_short
+
+
+def test_a_generator_that_refuses_to_be_closed_is_at_fault() -> None:
+    def clings(point: FractionalPoint) -> Iterator[Cut]:
+        try:
+            yield Cut([0], 0)
+        finally:
+            yield Cut([1], 0)
+
+    separation = Separation([Scripted(clings)], Problem(FORMULATION), deadline=time.monotonic() + 0.05)
+
+    def late(point: FractionalPoint) -> Iterator[Cut]:
+        time.sleep(0.1)
+        yield from ()
+
+    del late
+    separation.deadline = time.monotonic()
+    gc.collect()
+    separation.round(HALVES)
 
 
 @pytest.mark.parametrize("error", [SystemExit(3), GeneratorExit(), MemoryError(), StopIteration()])

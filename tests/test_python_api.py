@@ -20,6 +20,8 @@ from bcut.errors import InputError, ObjectiveError, ResultError, SeparatorLoadEr
 from bcut.geometry.configuration import PointConfiguration
 from bcut.objectives.syntax import FunctionText, objective_text, read_level, read_objective
 from bcut.separation.cases import CASES, case
+from bcut.separation.resolve import resolve
+from bcut.separation.template import write_template
 from bcut.solving.arguments import _ACCEPTED
 from bcut.solving.region import RegionResult
 
@@ -221,6 +223,32 @@ def test_what_is_one_may_stand_alone() -> None:
     assert bcut.bound("cube:3", separators="clique").problem.separators == ["clique"]
     with pytest.raises(SeparatorLoadError, match="link,clique"):
         bcut.solve("cube:3", separators="link,clique")
+
+
+def test_a_separator_is_checked_by_its_name_or_file(tmp_path: Path) -> None:
+    few = CASES[:3]
+    by_name, by_class = bcut.check_separator("link", few), bcut.check_separator(type(resolve("link")), few)
+    by_name.seconds = by_class.seconds = 0
+    assert by_name == by_class
+    assert by_name.ok
+    assert repr(by_name) == f"<CheckReport link: passed, {by_name.cuts} cuts>"
+    assert str(by_name) == by_name.summary
+    path = write_template("my-cuts", tmp_path)
+    assert bcut.check_separator(f"{path}:max_cuts=3", few).ok
+
+
+@pytest.mark.parametrize(
+    ("thing", "message"),
+    [
+        ("clik", "unknown separator 'clik'"),
+        (5, "5: give a name, a file or a subclass of bcut.Separator"),
+        (resolve("link"), "not one that is made already"),
+        (dict, "makes dict, no bcut.Separator"),
+    ],
+)
+def test_what_is_no_separator_is_not_checked(thing: Any, message: str) -> None:
+    with pytest.raises(SeparatorLoadError, match=message):
+        bcut.check_separator(thing)
 
 
 # Functions as objectives.

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ import click
 
 from bcut.cli.exits import exit_status
 from bcut.cli.output import emit
+from bcut.cli.termination import terminable
 from bcut.errors import InputError
 
 
@@ -44,7 +43,7 @@ def carry_out(
     check_output(output, instance)
     separators = [] if no_separators else list(separator) or None
     # Standard output is for the result; what a separator prints is for its author.
-    with redirect_stdout(sys.stderr), _terminable(), progress_line(quiet=quiet) as on_progress:
+    with redirect_stdout(sys.stderr), terminable(), progress_line(quiet=quiet) as on_progress:
         result = call(instance, separators=separators, on_progress=on_progress, **options)
     if output is not None:
         result.save(output)
@@ -53,23 +52,6 @@ def carry_out(
     elif not quiet:
         emit(summary(result, output))
     return exit_status(result.status)
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Take a request to end, as batch systems send it before they kill, for Ctrl-C: what was found is kept."""
-
-    def end(*_: object) -> None:
-        os.kill(os.getpid(), signal.SIGINT)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def check_output(output: Path | None, source: str) -> None:

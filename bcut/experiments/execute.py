@@ -2,13 +2,15 @@
 
 ``python -m bcut.experiments.execute FOLDER`` reads the task from standard input, and writes the record and the
 ledger, or the error, into the folder. The process ends when its standard input does: with the process that
-started it, however that one ends.
+started it, however that one ends; nobody but itself removes the folder then.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
+import signal
 import sys
 import threading
 import time
@@ -85,7 +87,10 @@ def _check_version(task: Mapping[str, Any]) -> None:
 def main(folder: Path) -> int:
     """Read a task from standard input, and write what comes of it; returns the exit status."""
     task = json.loads(sys.stdin.readline())
-    _end_with_standard_input()
+    _end_with_standard_input(folder)
+    # Limits interrupt what they end. Whoever started this may have done so in the background of a script, where
+    # interrupts are ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     _limit_memory(task["settings"]["memory_limit"])
     try:
         record, ledger = carry_out(task)
@@ -101,13 +106,14 @@ def main(folder: Path) -> int:
     return 0
 
 
-def _end_with_standard_input() -> None:
-    """End this process when nobody is left who could want its result."""
+def _end_with_standard_input(folder: Path) -> None:
+    """End this process, and remove its folder, when nobody is left who could want its result."""
 
     def wait() -> None:
         # Not through sys.stdin, whose lock a thread must not hold when the interpreter ends.
         while os.read(0, 4096):
             pass
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(3)
 
     threading.Thread(target=wait, daemon=True).start()

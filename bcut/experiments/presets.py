@@ -6,16 +6,22 @@ Each imports the solver that it uses; before any of them, PySCIPOpt has been loa
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from bcut.errors import InputError
+from bcut.experiments.interruption import KnownLoop, RootWatcher
 from bcut.experiments.ledger import LedgerWriter
 from bcut.experiments.measuring import delaunay, measured_at
 from bcut.experiments.recording import Recorder
 from bcut.experiments.scip_names import DEFAULT, named
+from bcut.solving.memory import Watch, watched
+
+Found = TypeVar("Found")
 
 
 class Run:
@@ -45,6 +51,11 @@ class Run:
         self.recorder: Recorder | None = None
         self.ledger: bytes | None = None
         self.triangulation: list[list[int]] | None = None
+        limit = self.settings["time_limit"]
+        self.deadline = None if limit is None else time.monotonic() + limit
+        self.formulation: Any = None
+        self.separation: Any = None
+        self.watch = Watch()
 
     def outcome(self) -> dict[str, Any]:
         """Do what the preset asks for; returns what came out, as plain data.
@@ -62,22 +73,34 @@ class Run:
 
     def loop(self) -> dict[str, Any]:
         """Run the cutting-plane loop in HiGHS."""
-        from bcut.bounds.root import RootLimits, root_bound
+        from bcut.bounds.root import RootBound, RootLimits, root_bound
 
         if self.settings["method"] != "listing":
             return self._by_bound()
-        formulation, objective = self._program()
-        self._record(formulation)
-        separation = self._separation(formulation)
-        target = None
-        if self.problem["cutoff"] is not None:
-            target = objective.sign * Fraction(self.problem["cutoff"])
-        limits = RootLimits(deadline=self._deadline(), target=target)
-        found = root_bound(formulation, objective, separation, limits=limits)
-        if self.recorder is not None:
-            self.ledger = self.recorder.finish_loop(found)
-        own = self._families(separation)
-        spent = sum(finished.seconds for finished in found.rounds)
+        known = KnownLoop()
+
+        def work() -> Any:
+            objective = self._begin()
+            target = None
+            if self.problem["cutoff"] is not None:
+                target = objective.sign * Fraction(self.problem["cutoff"])
+            limits = RootLimits(deadline=self.deadline, target=target)
+            known.started = time.perf_counter()
+            return root_bound(
+                self.formulation, objective, self.separation, limits=limits, on_relaxed=known.relaxed
+            )
+
+        ended = self._within_limit(work)
+        own = self._families()
+        found: RootBound
+        if ended is not None:
+            found, among = ended, None
+            spent = sum(finished.seconds for finished in found.rounds)
+            spent -= sum(entry["seconds"] for entry in own.values())
+        else:
+            nothing = RootBound(np.arange(self._size()["columns"] or 0))
+            found, among, spent = known.root or nothing, known.keys, known.seconds
+        self._finish_ledger(lambda recorder: recorder.finish_loop(found, among))
         return {
             "status": found.status,
             "lp": found.lp,
@@ -87,63 +110,64 @@ class Run:
             "bound": found.lp_after_cuts,
             "nodes": 0,
             "rounds": [[finished.lp, finished.cuts] for finished in found.rounds],
-            **self._size(formulation),
-            "columns_after_fixing": len(found.columns),
+            **self._size(),
+            "columns_after_fixing": None if self.formulation is None else len(found.columns),
             "separators": own,
-            "seconds": self._seconds(
-                lp=spent - self._recording - sum(entry["seconds"] for entry in own.values()), own=own
-            ),
+            "seconds": self._seconds(lp=spent - self._recording, own=own),
         }
 
     def root(self) -> dict[str, Any]:
         """Run SCIP's root node under clean conditions."""
         from bcut.scip.host import TreeOptions, branch_and_cut
 
-        formulation, objective = self._program()
-        self._record(formulation)
-        separation = self._separation(formulation)
         limited, unlimited = named(tuple(self.settings["scip"]))
-        options = TreeOptions(
-            seconds=self.settings["time_limit"],
-            nodes=1,
-            seed=self.settings["seed"],
-            cutoff=self._cutoff(objective),
-            scip_separators=DEFAULT in self.settings["scip"],
-            named=limited,
-            unlimited=unlimited,
-            presolve=False,
-            heuristics=False,
-            statistics=True,
-        )
-        watch = None if self.recorder is None else self.recorder.root_lp
-        tree = branch_and_cut(formulation, objective, separation, options=options, on_root_lp=watch)
-        if self.recorder is not None:
-            self.ledger = self.recorder.finish_scip()
-        lps = [finished.lp for finished in tree.rounds]
-        return {
-            "lp": lps[0] if lps else None,
-            "lp_after_cuts": lps[-1] if lps else None,
-            # By its point, or by rounding: see `outcome`. The point itself is not at hand.
-            "integral": tree.status == "optimal",
-            **self._of_tree(tree, objective, formulation, self._families(separation)),
-        }
+
+        def work() -> Any:
+            objective = self._begin(watcher)
+            options = TreeOptions(
+                seconds=self._seconds_left(),
+                nodes=1,
+                seed=self.settings["seed"],
+                cutoff=self._cutoff(objective),
+                scip_separators=DEFAULT in self.settings["scip"],
+                named=limited,
+                unlimited=unlimited,
+                presolve=False,
+                heuristics=False,
+                statistics=True,
+            )
+            show = None if self.recorder is None else self.recorder.root_lp
+            tree = branch_and_cut(
+                self.formulation, objective, self.separation, options=options, on_root_lp=show
+            )
+            return tree, objective
+
+        watcher = RootWatcher(self.watch)
+        with watcher.at_work():
+            found = self._within_limit(work)
+        self._finish_ledger(lambda recorder: recorder.finish_scip())
+        if found is None:
+            return self._unfinished(watcher)
+        tree, objective = found
+        # By its point, or by rounding: see `outcome`. The point itself is not at hand.
+        return {"integral": tree.status == "optimal", **self._of_tree(tree, objective, self._families())}
 
     def plain(self) -> dict[str, Any]:
         """Leave the exported model to SCIP and its defaults."""
         from bcut.scip.host import TreeOptions, branch_and_cut
 
-        formulation, objective = self._program()
-        options = TreeOptions(
-            seconds=self.settings["time_limit"], seed=self.settings["seed"], plain=True, statistics=True
-        )
-        tree = branch_and_cut(formulation, objective, None, options=options)
-        lps = [finished.lp for finished in tree.rounds]
-        return {
-            "lp": lps[0] if lps else None,
-            "lp_after_cuts": lps[-1] if lps else None,
-            "integral": None,
-            **self._of_tree(tree, objective, formulation, {}),
-        }
+        def work() -> Any:
+            self.formulation, objective = self._program()
+            options = TreeOptions(
+                seconds=self._seconds_left(), seed=self.settings["seed"], plain=True, statistics=True
+            )
+            return branch_and_cut(self.formulation, objective, None, options=options), objective
+
+        found = self._within_limit(work)
+        if found is None:
+            return self._unfinished(RootWatcher(self.watch))
+        tree, objective = found
+        return {"integral": None, **self._of_tree(tree, objective, {})}
 
     def solve(self) -> dict[str, Any]:
         """Solve as ``bcut solve`` does."""
@@ -186,9 +210,7 @@ class Run:
         """Count columns, rows and nonzeros, and solve nothing."""
         from bcut.experiments.sizes import count
 
-        counted = count(
-            self._formulation_name(), self.configuration, self.problem["spanning"], self._deadline()
-        )
+        counted = count(self._formulation_name(), self.configuration, self.problem["spanning"], self.deadline)
         return {**counted, "seconds": self._seconds(lp=0.0, own={})}
 
     def _by_bound(self) -> dict[str, Any]:
@@ -207,6 +229,49 @@ class Run:
         return self._of_result(result)
 
     # What several of them share.
+
+    def _within_limit(self, work: Callable[[], Found]) -> Found | None:
+        """Do the work; None where the time limit comes in the midst of what does not look at it, as a separator."""
+        try:
+            with watched(self.watch, memory=None, deadline=self.deadline):
+                return work()
+        except KeyboardInterrupt:
+            if not self.watch.reached:
+                raise
+            return None
+
+    def _begin(self, watcher: RootWatcher | None = None) -> Any:
+        """Write the program, and put recorder and separators to work on it; returns the objective."""
+        self.formulation, objective = self._program()
+        self._record(self.formulation)
+        observer: Any = self.recorder
+        if watcher is not None:
+            watcher.recorder, observer = self.recorder, watcher
+        self.separation = self._separation(self.formulation, observer)
+        return objective
+
+    def _finish_ledger(self, finish: Callable[[Recorder], bytes]) -> None:
+        if self.recorder is not None and not self.recorder.torn:
+            self.ledger = finish(self.recorder)
+
+    def _unfinished(self, watcher: RootWatcher) -> dict[str, Any]:
+        """Return what is known of SCIP's root where SCIP could not be heard."""
+        lps = [lp for lp, _ in watcher.rounds]
+        own = self._families()
+        return {
+            "integral": False if self.settings["preset"] == "root" else None,
+            "status": "limit",
+            "lp": lps[0] if lps else None,
+            "lp_after_cuts": lps[-1] if lps else None,
+            "value": None,
+            "bound": lps[-1] if lps else None,
+            "nodes": 1 if lps else 0,
+            "rounds": [[lp, cuts] for lp, cuts in watcher.rounds],
+            **self._size(),
+            "columns_after_fixing": None,
+            "separators": own,
+            "seconds": self._seconds(lp=0.0, own=own),
+        }
 
     def _program(self) -> tuple[Any, Any]:
         from bcut.objectives.objective import Bottleneck, make_objective
@@ -227,12 +292,14 @@ class Run:
 
         return formulation_name(self.problem["formulation"], dissection=False)
 
-    def _size(self, formulation: Any) -> dict[str, int]:
+    def _size(self) -> dict[str, int | None]:
         """Return the size of the program as it was written: without rows that are added where they are violated."""
+        if self.formulation is None:
+            return {"columns": None, "rows": None, "nonzeros": None}
         return {
-            "columns": len(formulation.simplices),
-            "rows": formulation.matrix.shape[0],
-            "nonzeros": int(formulation.matrix.nnz),
+            "columns": len(self.formulation.simplices),
+            "rows": self.formulation.matrix.shape[0],
+            "nonzeros": int(self.formulation.matrix.nnz),
         }
 
     def _record(self, formulation: Any) -> None:
@@ -241,21 +308,22 @@ class Run:
             header = {"instance": self.task["instance"], "problem": self.problem, "settings": self.settings}
             self.recorder = Recorder(LedgerWriter(header), formulation)
 
-    def _separation(self, formulation: Any) -> Any:
+    def _separation(self, formulation: Any, observer: Any) -> Any:
         from bcut.separation.driver import Separation
         from bcut.separation.resolve import resolve
         from bcut.separation.seam import Problem
 
         separators = [resolve(text) for text in self.settings["separators"]]
         # Without separators too: the observer hears of relaxations through it.
-        return Separation(separators, Problem(formulation), observer=self.recorder)
+        return Separation(separators, Problem(formulation), observer=observer)
 
-    def _families(self, separation: Any) -> dict[str, Any]:
-        return {name: asdict(family) for name, family in separation.statistics.items()}
+    def _families(self) -> dict[str, Any]:
+        if self.separation is None:
+            return {}
+        return {name: asdict(family) for name, family in self.separation.statistics.items()}
 
-    def _deadline(self) -> float | None:
-        limit = self.settings["time_limit"]
-        return None if limit is None else time.monotonic() + limit
+    def _seconds_left(self) -> float | None:
+        return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
 
     def _cutoff(self, objective: Any) -> float | None:
         """Return a cutoff that optimal solutions stay below, and no worse ones where values are multiples of a unit."""
@@ -276,24 +344,27 @@ class Run:
         # Recording is no part of the run, nor is what was set aside, as wall and as processor time.
         recording = 0.0 if self.recorder is None else self.recorder.processor
         return {
-            "total": time.perf_counter() - self.started - self._recording - aside[0],
-            "processor": time.process_time() - self.processor - recording - aside[1],
+            "total": max(0.0, time.perf_counter() - self.started - self._recording - aside[0]),
+            "processor": max(0.0, time.process_time() - self.processor - recording - aside[1]),
             "lp": max(0.0, lp),
             "separation": sum(entry["seconds"] for entry in own.values()),
         }
 
-    def _of_tree(self, tree: Any, objective: Any, formulation: Any, own: dict[str, Any]) -> dict[str, Any]:
+    def _of_tree(self, tree: Any, objective: Any, own: dict[str, Any]) -> dict[str, Any]:
         assert tree.solver is not None
         if tree.columns is not None:
-            self.triangulation = formulation.simplices[sorted(tree.columns)].tolist()
+            self.triangulation = self.formulation.simplices[sorted(tree.columns)].tolist()
         theirs = {f"scip:{name}": asdict(entry) for name, entry in tree.solver.separators.items()}
+        lps = [finished.lp for finished in tree.rounds]
         return {
-            "status": tree.status,
+            "status": "limit" if self.watch.reached and tree.status == "interrupted" else tree.status,
+            "lp": lps[0] if lps else None,
+            "lp_after_cuts": lps[-1] if lps else None,
             "value": None if tree.columns is None else float(objective.value(tree.columns)),
             "bound": tree.bound,
             "nodes": tree.nodes,
             "rounds": [[finished.lp, finished.cuts] for finished in tree.rounds],
-            **self._size(formulation),
+            **self._size(),
             "columns_after_fixing": None,
             "separators": {**own, **theirs},
             "seconds": self._seconds(

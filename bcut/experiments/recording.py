@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 # Cuts whose slack is at most this are tight.
 _TIGHT = 1e-6
 # SCIP's root; the loop before the tree is node 0.
-_SCIP_ROOT = 1
+SCIP_ROOT = 1
 
 Inequality = tuple[bytes, bytes, float]
+CutKey = tuple[bytes, bytes, int]
 
 
 @dataclass
@@ -74,12 +75,15 @@ class Recorder:
     counts : dict of str to CutCounts
     seconds, processor : float
         What recording took while separators were at work, as wall and as processor time: no part of that of a run.
+    torn : bool
+        Whether it was interrupted itself: then the ledger may lack a part of something, and is of no use.
     """
 
     def __init__(self, writer: LedgerWriter, whole: Formulation | None = None) -> None:
         self.writer, self.whole = writer, whole
         self.counts: dict[str, CutCounts] = {}
         self.seconds, self.processor = 0.0, 0.0
+        self.torn = False
         self._node, self._round, self._value = -1, 0, 0.0
         self._stirred = True
         self._open: list[_Open] = []
@@ -120,30 +124,41 @@ class Recorder:
 
     def took(self, cut: IntegerCut) -> None:
         """Note that the solver took a cut of this round."""
+        self.torn = True
         opened = self._by_key[cut.key]
         opened.entry["taken"] = True
         self._count(cut.family).taken += 1
         self._taken.append((opened.entry["number"], opened))
         self._stirred = True
+        self.torn = False
 
     def root_lp(self, lp: RootLp) -> None:
         """Note a relaxation of SCIP's root, and the rows that SCIP's own separators added to it."""
         before, spent = self._last_lp, (self.seconds, self.processor)
         if before is None or not np.array_equal(before.x, lp.x):
             self._stirred = True
-        self.relaxed(lp.value, _SCIP_ROOT)
+        self.relaxed(lp.value, SCIP_ROOT)
+        self.torn = True
         for row in lp.rows:
             key = _key(row.columns, row.coefficients, row.rhs)
             if row.family.startswith("scip:") and key not in self._known_rows:
                 self._known_rows[key] = self._write_row(row, before, lp.value)
         self._last_lp = lp
+        self.torn = False
         # The host knows what this took.
         self.seconds, self.processor = spent
 
     # The end.
 
-    def finish_loop(self, bound: RootBound) -> bytes:
-        """Write the last relaxation of a root bound; returns the file."""
+    def finish_loop(self, bound: RootBound, among: Container[CutKey] | None = None) -> bytes:
+        """Write the last relaxation of a root bound; returns the file.
+
+        Parameters
+        ----------
+        bound : RootBound
+        among : container, optional
+            Keys of the cuts in the relaxation, where the bound does not tell its cuts.
+        """
         assert self.whole is not None
         kept, lp = bound.columns, bound.lp_after_cuts
         # Where a limit came before the cuts of the last round were solved with, the value is that without them; and
@@ -162,7 +177,7 @@ class Recorder:
                 _key(place[opened.columns][stays], opened.coefficients[stays], float(opened.entry["rhs"]))
             ] = number
         final: list[int] = []
-        for cut in bound.cuts:
+        for cut in bound.cuts if among is None else self._taken_among(among, place):
             found = taken.get(_key(cut.columns, cut.coefficients.astype(float), float(cut.rhs)))
             if found is None:
                 # A row of a formulation whose rows are written when they are needed.
@@ -173,6 +188,21 @@ class Recorder:
             active = bound.point is not None and cut.violation(bound.point) >= -_TIGHT
             self._count_final(cut.family, active=active)
         return self._finish(lp, final, fixed, np.array([], dtype=int))
+
+    def _taken_among(self, keys: Container[CutKey], place: NDArray[np.integer]) -> Iterator[IntegerCut]:
+        """Yield the cuts with certain keys that the solver took; `place` is where columns of the whole are now."""
+        from bcut.separation.driver import IntegerCut
+
+        for _, opened in self._taken:
+            assert opened.columns is not None
+            columns = place[opened.columns]
+            stays = columns >= 0
+            coefficients = opened.coefficients[stays].astype(np.int64)
+            cut = IntegerCut(
+                opened.entry["family"], columns[stays].astype(np.int64), coefficients, opened.entry["rhs"], {}
+            )
+            if cut.key in keys:
+                yield cut
 
     def finish_scip(self) -> bytes:
         """Write the last relaxation of SCIP's root; returns the file."""
@@ -218,11 +248,13 @@ class Recorder:
     @contextmanager
     def _timed(self) -> Iterator[None]:
         started, processor = time.perf_counter(), time.process_time()
+        self.torn = True
         try:
             yield
         finally:
             self.seconds += time.perf_counter() - started
             self.processor += time.process_time() - processor
+        self.torn = False
 
     # Entries.
 
@@ -234,7 +266,7 @@ class Recorder:
         chosen: Sequence[IntegerCut],
     ) -> None:
         self._enter(problem)
-        if self._node <= _SCIP_ROOT:
+        if self._node <= SCIP_ROOT:
             self._write_point(problem.simplices, x)
         offered = {id(cut) for cut in chosen}
         for cut in found:
@@ -362,7 +394,7 @@ class Recorder:
             opened.entry["lp_after"] = value
             self.writer.write(opened.entry)
             # Only what the last relaxation may need stays in memory.
-            opened.entry = {"number": opened.entry["number"], "rhs": opened.entry["rhs"]}
+            opened.entry = {key: opened.entry[key] for key in ("number", "family", "rhs")}
         self._open, self._by_key = [], {}
 
     def _count(self, family: str) -> CutCounts:

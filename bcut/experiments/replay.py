@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from bcut.errors import BcutError, LedgerError, VerificationError
 from bcut.experiments.ledger import Ledger
 from bcut.verification.cuts import CUT_CHECKERS, Candidates, CertificateCut, UncheckedError
 from bcut.verification.exact_points import ExactPoints
+
+if TYPE_CHECKING:
+    from bcut.geometry.configuration import PointConfiguration
 
 # Relative to the larger of the bound and 1.
 REPLAY_TOLERANCE = 1e-9
@@ -60,9 +64,9 @@ def replay(ledger: Ledger) -> Replay:
     end, problem = ledger.end, ledger.header["problem"]
     if end["lp"] is None:
         raise LedgerError(
-            "this ledger records no last relaxation of a root; take one of a variant with preset 'loop' or 'root'"
+            f"{ledger.label}: records no last relaxation of a root; take one of a variant with preset 'loop' or 'root'"
         )
-    configuration = _configuration(ledger.header["instance"])
+    configuration = _configuration(ledger)
     name = formulation_name(problem["formulation"], dissection=False)
     formulation = make_formulation(name, configuration, spanning=problem["spanning"])
     objective = make_objective(problem["objective"], formulation, sense=problem["sense"])
@@ -73,8 +77,11 @@ def replay(ledger: Ledger) -> Replay:
     def columns(simplices: list[list[int]]) -> NDArray[np.int64]:
         try:
             return np.array([place[tuple(simplex)] for simplex in simplices], dtype=np.int64)
-        except KeyError as error:
-            raise LedgerError(f"the ledger speaks of {error}, which is no candidate simplex") from None
+        except (KeyError, TypeError):
+            strange = next(s for s in simplices if not isinstance(s, list) or tuple(s) not in place)
+            raise LedgerError(
+                f"{ledger.label}: speaks of {json.dumps(strange)}, which is no candidate simplex of its points"
+            ) from None
 
     rows = [
         IntegerCut(cut["family"], columns(cut["simplices"]), np.array(cut["coefficients"]), cut["rhs"], {})
@@ -93,12 +100,15 @@ def replay(ledger: Ledger) -> Replay:
     return Replay(float(end["lp"]), point.value, plain.value, len(rows) - len(end["at_one"]))
 
 
-def _configuration(instance: Mapping[str, Any]) -> Any:
+def _configuration(ledger: Ledger) -> PointConfiguration:
     from bcut.geometry.configuration import PointConfiguration
 
+    instance = ledger.header["instance"]
     configuration = PointConfiguration.from_values(instance["points"], name=instance["name"])
     if configuration.digest != instance["digest"]:
-        raise LedgerError("the points of the ledger do not have the digest that stands beside them")
+        raise LedgerError(
+            f"{ledger.label}: its points do not have the digest that stands beside them: one of the two was changed"
+        )
     return configuration
 
 
@@ -135,13 +145,13 @@ class UncheckedCutsError(BcutError):
 
     exit_status = 3
 
-    def __init__(self, checks: CutChecks) -> None:
+    def __init__(self, checks: CutChecks, label: str) -> None:
         self.checks = checks
         named = "; ".join(f"cut {number}: {reason}" for number, reason in checks.unchecked[:_MOST_REASONS])
         more = len(checks.unchecked) - _MOST_REASONS
         proven = ", ".join(f"{count} {family}" for family, count in sorted(checks.proven.items()))
         super().__init__(
-            f"{len(checks.unchecked)} of the cuts were not checked ({named}"
+            f"{label}: {len(checks.unchecked)} of the cuts were not checked ({named}"
             + (f"; and {more} more" if more > 0 else "")
             + f"); none is refused, {proven or 'none'} proven again"
         )
@@ -166,7 +176,7 @@ def check_ledger(ledger: Ledger) -> CutChecks:
         No cut is refused, but some take too long to check.
     """
     problem = ledger.header["problem"]
-    points = ExactPoints(_configuration(ledger.header["instance"]).scalars())
+    points = ExactPoints(_configuration(ledger).scalars())
     whole = Candidates(points, spanning=problem["spanning"])
     tables: dict[int, Candidates] = {}
     checks = CutChecks()
@@ -175,7 +185,7 @@ def check_ledger(ledger: Ledger) -> CutChecks:
         if family not in CUT_CHECKERS:
             checks.without_checker[family] = checks.without_checker.get(family, 0) + 1
             continue
-        cut = _certificate_cut(entry, points)
+        cut = _certificate_cut(entry, points, ledger.label)
         part = entry["part"]
         if part not in tables:
             tables[part] = whole
@@ -194,30 +204,35 @@ def check_ledger(ledger: Ledger) -> CutChecks:
         else:
             checks.proven[family] = checks.proven.get(family, 0) + 1
     if checks.unchecked and not checks.refused:
-        raise UncheckedCutsError(checks)
+        raise UncheckedCutsError(checks, ledger.label)
     return checks
 
 
-def _certificate_cut(entry: Mapping[str, Any], points: ExactPoints) -> CertificateCut:
-    simplices, coefficients = entry["simplices"], entry["coefficients"]
-    good = (
-        isinstance(simplices, list)
-        and isinstance(coefficients, list)
-        and len(simplices) == len(coefficients) > 0
-        and all(_is_simplex(simplex, points) for simplex in simplices)
-        and all(type(value) is int for value in (*coefficients, entry["rhs"]))
-        and isinstance(entry["proof"], dict)
-    )
-    if not good or len({tuple(simplex) for simplex in simplices}) != len(simplices):
-        raise LedgerError(
-            f"cut {entry['number']} is malformed: it needs different simplices, an integer for each, "
-            "and a right-hand side"
+def _certificate_cut(entry: Mapping[str, Any], points: ExactPoints, label: str) -> CertificateCut:
+    simplices, coefficients, rhs = entry["simplices"], entry["coefficients"], entry["rhs"]
+    wrong = ""
+    if not simplices:
+        wrong = "it has no simplices"
+    elif not all(_is_simplex(simplex, points) for simplex in simplices):
+        strange = next(simplex for simplex in simplices if not _is_simplex(simplex, points))
+        wrong = (
+            f"{json.dumps(strange)} is no list of {points.dimension + 1} ascending points below {points.n}"
         )
+    elif len({tuple(simplex) for simplex in simplices}) != len(simplices):
+        wrong = "it has the same simplex twice"
+    elif len(coefficients) != len(simplices):
+        wrong = f"it has {len(coefficients)} coefficients for {len(simplices)} simplices"
+    elif not all(type(value) is int for value in coefficients):
+        wrong = "its coefficients are not all integers"
+    elif type(rhs) is not int:
+        wrong = f"its right-hand side is {rhs!r}, where an integer belongs"
+    if wrong:
+        raise LedgerError(f"{label}: cut {entry['number']} is malformed: {wrong}")
     return CertificateCut(
         entry["family"],
         tuple(tuple(simplex) for simplex in simplices),
         tuple(Fraction(value) for value in coefficients),
-        Fraction(entry["rhs"]),
+        Fraction(rhs),
         Fraction(0),
         entry["proof"],
     )

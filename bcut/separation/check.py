@@ -11,18 +11,21 @@ from __future__ import annotations
 
 import inspect
 import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from bcut.errors import SeparatorError
+from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.separation.calls import MAX_CUTS, EndlessSeparatorError, cuts_of, guard
 from bcut.separation.cases import CASES, Case, CaseName, Point, case, disturbed
 from bcut.separation.driver import MIN_EFFICACY, IntegerCut, to_integers
-from bcut.separation.seam import Cut, FractionalPoint, Separator
+from bcut.separation.resolve import resolve
+from bcut.separation.seam import FractionalPoint, Separator
+
+Result = TypeVar("Result")
 
 # Rounds of a separator's own cuts on each objective.
 _ROUNDS = 3
@@ -32,8 +35,9 @@ _ENOUGH_FAILURES = 5
 RULES = {
     "name": "it has a name",
     "parameters": "every parameter has a default",
-    "runs": "it never raises",
-    "cuts": "it yields cuts: distinct columns, exact numbers",
+    "runs": "it never raises, nor exits",
+    "ends": f"it comes to an end: at most {MAX_CUTS:,} cuts for a point",
+    "cuts": "it yields cuts: distinct columns, exact numbers, proofs that JSON holds",
     "read-only": "it leaves the point as it is",
     "deterministic": "the same points give the same cuts",
     "valid": "no cut cuts off a triangulation",
@@ -92,6 +96,8 @@ class CheckReport:
     separator : str
         The name of the family.
     failures : list of Failure
+    reached : set of str
+        The rules that were put to the test at least once: without a cut, nothing is known of validity.
     configurations, triangulations, points : int
         How many there were; where a configuration has several cases, it counts for each.
     dissections : int or None
@@ -104,6 +110,7 @@ class CheckReport:
 
     separator: str
     failures: list[Failure] = field(default_factory=list)
+    reached: set[str] = field(default_factory=set)
     configurations: int = 0
     triangulations: int = 0
     dissections: int | None = None
@@ -112,9 +119,15 @@ class CheckReport:
     violated: int = 0
     seconds: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<CheckReport {self.separator}: {'passed' if self.ok else 'FAILED'}, {self.cuts} cuts>"
+
+    def __str__(self) -> str:
+        return self.summary
+
     @property
     def ok(self) -> bool:
-        """Whether every rule was kept."""
+        """Whether no rule was broken."""
         return not self.failures
 
     @property
@@ -129,17 +142,22 @@ class CheckReport:
         lines = [f"separator '{self.separator}': {'passed' if self.ok else 'FAILED'}"]
         for rule, text in RULES.items():
             if rule != "dissections" or self.dissections:
-                lines.append(f"  {'FAILED' if rule in broken else 'ok':6}  {text}")
+                found = "FAILED" if rule in broken else "ok" if rule in self.reached else "not reached"
+                lines.append(f"  {found:11}  {text}")
         solutions = f"{self.triangulations} triangulations"
         if self.dissections is not None:
             solutions += f" and {self.dissections} dissections"
-        lines.append(
-            f"  {self.cuts} cuts ({self.violated} violated where they were found) at {self.points} points of "
-            f"{self.configurations} configurations, against {solutions}, {self.seconds:.1f} s"
-        )
-        if self.ok and not self.violated:
+        where = f"at {self.points} points of {self.configurations} configurations"
+        if self.cuts:
+            compared = f"{self.cuts} cuts ({self.violated} violated where they were found) {where}, against"
+        else:
+            compared = f"no cut {where}, which have"
+        lines.append(f"  {compared} {solutions}, {self.seconds:.1f} s")
+        if self.ok and not self.cuts:
+            lines.append("  It yielded no cut at any point: that its cuts are valid was not tested.")
+        elif self.ok and not self.violated:
             lines.append("  No cut was violated anywhere: validity was hardly put to the test.")
-        if self.ok and self.dissections == 0:
+        if self.ok and self.cuts and self.dissections == 0:
             lines.append(
                 "  No case had dissections: that cuts are valid for them, as declared, was not tested."
             )
@@ -148,13 +166,16 @@ class CheckReport:
         return "\n".join(lines)
 
 
-def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = CASES) -> CheckReport:
+def check_separator(
+    separator: str | Callable[[], Separator], cases: Sequence[CaseName] = CASES
+) -> CheckReport:
     """Check that a separator keeps its contract.
 
     Parameters
     ----------
-    make : callable
-        Makes a new separator, such as ``MyCuts`` or ``lambda: resolve("./my_cuts.py:depth=3")``.
+    separator : str or callable
+        A name or a file, as for `bcut.solve`: ``"link"``, ``"./my_cuts.py:depth=3"``. Or what makes a new separator,
+        such as the class ``MyCuts`` or ``lambda: MyCuts(depth=3)``.
     cases : sequence of CaseName, optional
         On which configurations. Those about dissections are left out where the family is not for dissections.
 
@@ -165,16 +186,20 @@ def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = C
     Raises
     ------
     BcutError
-        Whatever `make` raises; what the separator raises later is in the report.
+        If there is no such separator, or it cannot be made; what it raises later is in the report.
     """
     started = time.perf_counter()
+    make = _maker(separator)
     first = make()
+    if not isinstance(first, Separator):
+        raise SeparatorLoadError(f"{separator!r} makes {type(first).__name__}, no bcut.Separator")
     report = CheckReport(str(first.name) or type(first).__name__)
     _check_declaration(first, report)
     if first.dissections:
         report.dissections = 0
     for name in cases:
-        if len(report.failures) >= _ENOUGH_FAILURES:
+        endless = any(failure.rule == "ends" for failure in report.failures)
+        if endless or len(report.failures) >= _ENOUGH_FAILURES:
             break
         if name.dissection and report.dissections is None:
             continue
@@ -190,7 +215,20 @@ def check_separator(make: Callable[[], Separator], cases: Sequence[CaseName] = C
     return report
 
 
+def _maker(separator: Any) -> Callable[[], Separator]:
+    """Return what makes a new separator: the suite sets up one for each case, and compares two."""
+    if isinstance(separator, str):
+        return partial(resolve, separator)
+    if isinstance(separator, Separator) or not callable(separator):
+        raise SeparatorLoadError(
+            f"{separator!r}: give a name, a file or a subclass of bcut.Separator, not one that is made already; with "
+            "parameters, write 'link:parameter=value' or lambda: MyCuts(depth=3)"
+        )
+    return separator
+
+
 def _check_declaration(separator: Separator, report: CheckReport) -> None:
+    report.reached |= {"name", "parameters"}
     family = type(separator)
     if not (isinstance(family.name, str) and family.name):
         report.failures.append(
@@ -221,7 +259,7 @@ class _CaseCheck:
     def run(self) -> None:
         try:
             for separator in (self.separator, self.second):
-                self._call("setup()", partial(separator.setup, self.case.problem))
+                self._call(separator, "setup", partial(separator.setup, self.case.problem))
             for x in self._points():
                 self._look(x)
         except _BrokenRuleError as broken:
@@ -254,41 +292,42 @@ class _CaseCheck:
         if [cut.key for cut in self._cuts(self.second, x)] != [cut.key for cut in cuts]:
             text = f"{self.case.name}: two new separators, shown the same points, yielded different cuts"
             raise _BrokenRuleError("deterministic", text)
+        if cuts:
+            self.report.reached.add("deterministic")
         return cuts
 
     def _cuts(self, separator: Separator, x: Point) -> list[IntegerCut]:
         point = FractionalPoint(self.case.problem, x)
         before = _contents(point)
-        yielded = self._call("separate()", lambda: list(separator.separate(point)))
+        cuts = self._call(
+            separator,
+            "separate",
+            lambda: [to_integers(cut, separator.name, len(x)) for cut in cuts_of(separator, point)],
+        )
+        self.report.reached |= {"runs", "ends", "read-only"}
         for name, content in _contents(point).items():
             if content != before[name]:
                 raise _BrokenRuleError(
                     "read-only", f"{self.case.name}: separate() changed the point's {name}; work on a copy"
                 )
-        scaled = []
-        for cut in yielded:
-            if not isinstance(cut, Cut):
-                text = f"{self.case.name}: separate() yielded {type(cut).__name__} {cut!r}, no Cut"
-                raise _BrokenRuleError("cuts", text)
-            try:
-                scaled.append(to_integers(cut, separator.name, len(x)))
-            except (SeparatorError, OverflowError) as error:
-                raise _BrokenRuleError("cuts", f"{self.case.name}: {error}") from None
-        return scaled
+        if cuts:
+            self.report.reached.add("cuts")
+        return cuts
 
-    def _call(self, what: str, action: Callable[[], Any]) -> Any:
+    def _call(self, separator: Separator, call: str, action: Callable[[], Result]) -> Result:
         try:
-            return action()
-        except Exception as error:
-            text = (
-                f"{self.case.name}: {what} raised {type(error).__name__}: {error}\n{traceback.format_exc()}"
-            )
-            raise _BrokenRuleError("runs", text.rstrip()) from None
+            with guard(separator, call):
+                return action()
+        except SeparatorError as error:
+            # Only what was raised has a traceback; the other errors are about what was handed back.
+            rule = "ends" if isinstance(error, EndlessSeparatorError) else "runs" if error.trace else "cuts"
+            raise _BrokenRuleError(rule, f"{self.case.name}: {error}\n{error.trace}".rstrip()) from None
 
     def _compare(self, cut: IntegerCut, x: Point) -> None:
         if cut.key in self.known:
             return
         self.known.add(cut.key)
+        self.report.reached.add("dissections" if self.case.name.dissection else "valid")
         self.report.cuts += 1
         self.report.violated += bool(cut.efficacy(x) > MIN_EFFICACY)
         left_sides = self.case.left_sides(cut)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-import traceback
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor, gcd, lcm
 from typing import Any
@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.errors import SeparatorError, SeparatorLoadError
+from bcut.separation.calls import cuts_of, guard, shown
 from bcut.separation.observer import CutObserver
+from bcut.separation.proofs import plain_proof
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 
 # SCIP's own threshold at the root: violation divided by the Euclidean norm of the coefficients.
@@ -96,17 +98,29 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
     Raises
     ------
     SeparatorError
-        If the cut is malformed: unknown or repeated columns, inexact numbers, lengths that differ.
+        If the cut is malformed: unknown or repeated columns, inexact numbers, lengths that differ, a proof that JSON
+        does not hold.
     UnusableCutError
         If the integers do not fit into 64 bits.
     """
-    indices = np.asarray(cut.simplices)
+    try:
+        indices = np.asarray(cut.simplices)
+    except ValueError:  # lists of different lengths
+        indices = np.empty(0)
     if indices.ndim != 1 or not len(indices) or not np.issubdtype(indices.dtype, np.integer):
         raise SeparatorError(
-            family, f"a cut's simplices must be a non-empty list of columns, not {cut.simplices!r}"
+            family, f"a cut's simplices must be a non-empty list of columns, not {shown(cut.simplices)}"
         )
     if indices.min() < 0 or indices.max() >= columns or len(np.unique(indices)) != len(indices):
-        raise SeparatorError(family, f"a cut's simplices must be distinct columns from 0 to {columns - 1}")
+        raise SeparatorError(
+            family,
+            f"a cut's simplices must be distinct columns from 0 to {columns - 1}, not {shown(cut.simplices)}",
+        )
+    if not (cut.coefficients is None or isinstance(cut.coefficients, Iterable)):
+        raise SeparatorError(
+            family,
+            f"a cut's coefficients must be a list of numbers, or left out, not {shown(cut.coefficients)}",
+        )
     given = [1] * len(indices) if cut.coefficients is None else list(cut.coefficients)
     if len(given) != len(indices):
         raise SeparatorError(family, f"a cut has {len(indices)} simplices but {len(given)} coefficients")
@@ -125,7 +139,9 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
         message = "a cut has numbers of more than 62 bits as coprime integers; no solver can use it"
         raise UnusableCutError(family, message)
     coefficients = np.array(coprime, dtype=np.int64)
-    return IntegerCut(family, indices[keep].astype(np.int64), coefficients, right, cut.proof)
+    return IntegerCut(
+        family, indices[keep].astype(np.int64), coefficients, right, plain_proof(cut.proof, family)
+    )
 
 
 class UnusableCutError(SeparatorError):
@@ -156,11 +172,16 @@ class Separation:
         Counts to go on from, changed in place.
     observer : CutObserver, optional
         Is told of every round.
+    deadline : float, optional
+        Value of `time.monotonic` after which no separator is asked any further; the cuts found by then are kept. Only
+        between two cuts can a separator be stopped.
 
     Attributes
     ----------
     statistics : dict of str to FamilyStatistics
         Live counts, by family.
+    cut_short : bool
+        Whether the deadline ended the last round, so that no cuts do not mean that there are none.
     """
 
     def __init__(
@@ -171,8 +192,10 @@ class Separation:
         *,
         statistics: dict[str, FamilyStatistics] | None = None,
         observer: CutObserver | None = None,
+        deadline: float | None = None,
     ) -> None:
-        self.observer = observer
+        self.observer, self.deadline = observer, deadline
+        self.cut_short = False
         self.separators = list(separators)
         self.problem = problem
         self.limits = limits or Limits()
@@ -182,14 +205,19 @@ class Separation:
             self.statistics.setdefault(separator.name, FamilyStatistics())
         self.known: set[tuple[bytes, bytes, int]] = set()
         for separator in self.separators:
-            with _guard(separator, "setup", self.statistics[separator.name]):
+            with guard(separator, "setup", self.statistics[separator.name]):
                 separator.setup(problem)
 
     def restricted_to(self, columns: NDArray[np.integer]) -> Separation:
         """Put the same separators to work on some of the columns; the statistics go on."""
         problem = Problem(self.problem.formulation.restricted_to(columns))
         return Separation(
-            self.separators, problem, self.limits, statistics=self.statistics, observer=self.observer
+            self.separators,
+            problem,
+            self.limits,
+            statistics=self.statistics,
+            observer=self.observer,
+            deadline=self.deadline,
         )
 
     def relaxed(self, value: float, *, node: int = 0) -> None:
@@ -215,8 +243,9 @@ class Separation:
         Raises
         ------
         SeparatorError
-            If a separator raises or yields something that is no cut.
+            If a separator raises, yields something that is no cut, or yields cuts without end.
         """
+        self.cut_short = False
         point = FractionalPoint(self.problem, x)
         if point.is_integral:
             return []
@@ -227,26 +256,37 @@ class Separation:
                 if separator.stage == stage:
                     candidates.extend(self._ask(separator, point))
             chosen = self._select(candidates, x)
-            if chosen:
+            if chosen or self.cut_short:
                 break
         if self.observer is not None:
             self.observer.separated(self.problem, x, candidates, chosen)
         return chosen
 
-    def _ask(self, separator: Separator, point: FractionalPoint) -> Iterator[IntegerCut]:
-        """Yield the cuts of one separator that are violated enough."""
+    def _ask(self, separator: Separator, point: FractionalPoint) -> list[IntegerCut]:
+        """Return the cuts of one separator that are violated enough; where the time is over, those so far."""
+        asked: list[IntegerCut] = []
+        if self._out_of_time():
+            return asked
         statistics = self.statistics[separator.name]
         statistics.calls += 1
-        with _guard(separator, "separate", statistics):
-            for cut in separator.separate(point):
+        with guard(separator, "separate", statistics), closing(cuts_of(separator, point)) as cuts:
+            for cut in cuts:
                 try:
-                    scaled = to_integers(_checked(cut, separator.name), separator.name, len(point.x))
+                    scaled = to_integers(cut, separator.name, len(point.x))
                 except UnusableCutError:
                     statistics.found += 1
-                    continue
-                if scaled.efficacy(point.x) > self.limits.min_efficacy:
-                    statistics.found += 1
-                    yield scaled
+                else:
+                    if scaled.efficacy(point.x) > self.limits.min_efficacy:
+                        statistics.found += 1
+                        asked.append(scaled)
+                if self._out_of_time():
+                    break
+        return asked
+
+    def _out_of_time(self) -> bool:
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            self.cut_short = True
+        return self.cut_short
 
     def confirm(self, cut: IntegerCut) -> None:
         """Record that the solver took a cut: it counts as added and is not offered again."""
@@ -309,30 +349,3 @@ class _Directions:
             for other, entry in self.by_column.get(column, ()):
                 products[other] += value * entry
         return max(products, default=0.0)
-
-
-def _checked(cut: Any, family: str) -> Cut:
-    if not isinstance(cut, Cut):
-        raise SeparatorError(family, f"separate() must yield Cut objects, not {type(cut).__name__}")
-    return cut
-
-
-@dataclass
-class _guard:  # noqa: N801 - used like a function
-    """Time a call into a plug-in; whatever it raises becomes a `SeparatorError` with its own traceback."""
-
-    separator: Separator
-    call: str
-    statistics: FamilyStatistics
-    started: float = field(default=0.0, init=False)
-
-    def __enter__(self) -> None:
-        self.started = time.perf_counter()
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
-        self.statistics.seconds += time.perf_counter() - self.started
-        if error is None or isinstance(error, SeparatorError | KeyboardInterrupt):
-            return
-        text = "".join(traceback.format_exception(error))
-        message = f"{self.call}() raised {type(error).__name__}: {error}"
-        raise SeparatorError(self.separator.name, message, text) from error

@@ -51,7 +51,7 @@ class Cut:
         Exact, one for each simplex; all 1 when omitted.
     proof : mapping
         What makes the inequality valid, as JSON-ready data (the clique, the cycle, the face and its weights,
-        ...).
+        ...). Numbers and arrays of numpy, tuples and Fractions may be among it.
     """
 
     simplices: Sequence[int] | NDArray[np.integer]
@@ -264,4 +264,8 @@ class Separator(ABC):
 
     @abstractmethod
     def separate(self, point: FractionalPoint) -> Iterable[Cut]:
-        """Yield valid inequalities that the point violates, most useful ones first."""
+        """Yield valid inequalities that the point violates, most useful ones first.
+
+        A host stops listening when its time is over, which it sees between two cuts only, and refuses more than
+        100,000 of them for one point. No cut at all is a fine answer; None is not.
+        """

@@ -153,7 +153,9 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             best.keep(search)
         if outcome == "refuted":
             refuted += 1
-            search.raise_bound(target + objective.unit)
+            # SCIP refutes within its tolerances: where units are finer than those, also what was found before.
+            assert best.value is not None
+            search.raise_bound(min(target + objective.unit, search.sign * best.value))
         elif outcome != "reached":
             search.status = outcome
             return

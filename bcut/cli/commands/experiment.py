@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bcut.cli.exits import ExitStatus
+from bcut.cli.termination import terminable
 
 if TYPE_CHECKING:
     from bcut.experiments.engine import Progress
@@ -48,13 +49,14 @@ def run_command(plan: Path, output: Path, scheduler: str | None, workers: int | 
     """Carry out the runs of the file PLAN, and store each in DIR as it ends.
 
     A run is known by its inputs and by the version of the program. Those that are stored are skipped, so what
-    was interrupted, by Ctrl-C or otherwise, goes on where it was when the command is given again. A run that fails
-    loses only itself. Exit status: 0 all is stored, 2 the plan cannot be used, 5 some runs failed, 130 interrupted.
+    was interrupted, by Ctrl-C, SIGTERM or otherwise, goes on where it was when the command is given again. A run
+    that fails loses only itself. Exit status: 0 all is stored, 2 the plan cannot be used, 5 some runs failed, 130
+    interrupted.
     """
     from bcut.cli.output import emit
     from bcut.experiments.engine import run_experiment
 
-    with _progress_bar(quiet=quiet) as watcher:
+    with terminable(), _progress_bar(quiet=quiet) as watcher:
         progress = run_experiment(plan, output, scheduler=scheduler, workers=workers, on_progress=watcher)
     for instance, variant, message in progress.failures[:_MOST_LISTED]:
         print(f"failed: {instance}, {variant}: {message}", file=sys.stderr)

@@ -22,7 +22,7 @@ from bcut.experiments.store import Store
 
 # A root LP this close to the optimum, relative to it, leaves no gap to close.
 _GAP = 1e-6
-# Of a share of the gap.
+# Of a share of the gap, and of means.
 _DIGITS = 9
 _SETTLED = ("optimal", "infeasible")
 _ROOT_PRESETS = ("loop", "root")
@@ -79,12 +79,16 @@ class Run:
     @property
     def seconds(self) -> float:
         """Wall time of the run, without starting the process and loading the instance."""
-        return float(self.outcome["seconds"]["total"])
+        return self._took("total")
 
     @property
     def processor_seconds(self) -> float:
-        """Processor time of the run: what can be compared when the machine had other work too."""
-        return float(self.outcome["seconds"]["processor"])
+        """Processor time of the run: what can be compared when the machine had other work too; else wall time."""
+        return self._took("processor" if "processor" in self.outcome["seconds"] else "total")
+
+    def _took(self, what: str) -> float:
+        # What recording took was subtracted; older versions subtracted some of it twice.
+        return max(0.0, float(self.outcome["seconds"][what]))
 
     @property
     def is_root(self) -> bool:
@@ -242,5 +246,7 @@ def shifted_geometric_mean(values: Sequence[float], shift: float) -> float | Non
     """Return ``exp(mean(log(values + shift))) - shift``; None of nothing."""
     if not values:
         return None
-    # Rounding must not make it negative, as values never are.
-    return max(0.0, exp(sum(log(value + shift) for value in values) / len(values)) - shift)
+    # Without the noise of the logarithms, which leaves zero neither zero nor even positive. Of times by clocks that
+    # were set back, a negative one counts as none.
+    found = exp(sum(log(max(0.0, value) + shift) for value in values) / len(values)) - shift
+    return max(0.0, round(found, _DIGITS))
