@@ -16,6 +16,7 @@ from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.crossings import crossing_matrix
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
+from bcut.separation import calls
 from bcut.separation.cases import CASES, CaseName, case
 from bcut.separation.check import RULES, CheckReport, check_separator
 from bcut.separation.driver import to_integers
@@ -52,6 +53,11 @@ class Pairs(Separator):
                 yield Cut([i, j], 1)
 
 
+def rules(report: CheckReport, found: str) -> set[str]:
+    """The rules of which the summary says so."""
+    return {rule for rule, text in RULES.items() if f"\n  {found:11}  {text}\n" in report.summary}
+
+
 def broken(report: CheckReport) -> set[str]:
     assert not report.ok
     assert "FAILED" in report.summary
@@ -70,7 +76,9 @@ def test_the_built_in_families_pass(name: str) -> None:
     assert report.violated > 10
     assert report.seconds < 30
     assert "passed" in report.summary
-    assert all(f"ok      {text}" in report.summary for rule, text in RULES.items() if rule != "dissections")
+    assert all(
+        f"ok           {text}" in report.summary for rule, text in RULES.items() if rule != "dissections"
+    )
     assert RULES["dissections"] not in report.summary
 
 
@@ -89,7 +97,24 @@ def test_a_separator_that_finds_nothing_passes_with_a_remark() -> None:
 
     report = check_separator(Nothing, FEW[:2])
     assert report.ok
+    assert "It yielded no cut at any point: that its cuts are valid was not tested." in report.summary
+    assert "no cut at" in report.summary
+    assert rules(report, "not reached") == {"cuts", "deterministic", "valid"}
+    assert rules(report, "ok") == {"name", "parameters", "runs", "ends", "read-only"}
+
+
+def test_a_separator_whose_cuts_are_satisfied_passes_with_a_remark() -> None:
+    class Trivial(Separator):
+        name = "trivial"
+
+        def separate(self, point: FractionalPoint) -> list[Cut]:
+            return [Cut([0], 1)]
+
+    report = check_separator(Trivial, FEW[:2])
+    assert report.ok
+    assert report.cuts == 2
     assert "hardly put to the test" in report.summary
+    assert rules(report, "not reached") == set()
 
 
 class TooFew(Separator):
@@ -185,7 +210,7 @@ def test_the_built_in_families_for_dissections_are_compared_with_all_of_them(nam
     assert (report.configurations, report.triangulations) == (len(DISSECTIONS), 0)
     assert report.dissections == sum(case(name).incidence.shape[1] for name in DISSECTIONS) > 1500
     assert report.violated > 10
-    assert f"ok      {RULES['dissections']}" in report.summary
+    assert f"ok           {RULES['dissections']}" in report.summary
     assert f"0 triangulations and {report.dissections} dissections" in report.summary
 
 
@@ -206,8 +231,8 @@ class NoCrossings(Separator):
 def test_cuts_that_only_triangulations_satisfy_are_refused_for_dissections() -> None:
     report = check_separator(NoCrossings, (*FEW, *DISSECTIONS))
     assert broken(report) == {"dissections"}
-    assert f"FAILED  {RULES['dissections']}" in report.summary
-    assert f"ok      {RULES['valid']}" in report.summary
+    assert f"FAILED       {RULES['dissections']}" in report.summary
+    assert f"ok           {RULES['valid']}" in report.summary
     assert len(report.invalid_cuts) == len(report.failures) == 5
     for invalid in report.invalid_cuts:
         assert invalid.dissection
@@ -255,6 +280,68 @@ def test_a_separator_that_raises_is_named_with_its_traceback() -> None:
     assert "IndexError" in report.summary
     assert "yield Cut([int(point.support[3])], 1)" in report.summary
     assert "hypersimplex:3,1" in report.failures[0].text
+    assert "check.py" not in report.summary.replace("test_separator_check.py", "")
+    assert rules(report, "not reached") == {"ends", "cuts", "read-only", "deterministic", "valid"}
+    assert rules(report, "ok") == {"name", "parameters"}
+
+
+@pytest.mark.parametrize("call", ["setup", "separate"])
+@pytest.mark.parametrize("status", [0, 7])
+def test_a_separator_that_exits_does_not_end_the_check(call: str, status: int) -> None:
+    def exits(*_: Any) -> None:
+        raise SystemExit(status)
+
+    exiting = type("Exiting", (Pairs,), {"name": "exiting", call: exits})
+    report = check_separator(exiting, FEW)
+    assert broken(report) == {"runs"}
+    text = f"separator 'exiting': {call}() raised SystemExit: {status}; it must return, not exit"
+    assert text in report.summary
+
+
+def test_ctrl_c_ends_the_check() -> None:
+    class Interrupted(Separator):
+        name = "interrupted"
+
+        def separate(self, point: FractionalPoint) -> list[Cut]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        check_separator(Interrupted, FEW)
+
+
+@pytest.mark.parametrize("returned", [None, 42, Cut([0], 0)])
+def test_a_separator_that_returns_no_list_is_told_so(returned: Any) -> None:
+    class Returns(Separator):
+        name = "returns"
+
+        def separate(self, point: FractionalPoint) -> Any:
+            return returned
+
+    report = check_separator(Returns, FEW[:1])
+    assert broken(report) == {"cuts"}
+    shown = "None" if returned is None else type(returned).__name__
+    assert f"cuts: hypersimplex:3,1: separator 'returns': separate() returned {shown}" in report.summary
+    assert "yield Cuts or return a list of them" in report.summary
+    assert "Traceback" not in report.summary
+
+
+def test_a_separator_that_does_not_end_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calls, "MAX_CUTS", 1000)
+
+    class Endless(Separator):
+        name = "endless"
+
+        def separate(self, point: FractionalPoint) -> Iterator[Cut]:
+            while True:
+                yield Cut([0], 1)
+
+    report = check_separator(Endless, FEW)
+    assert broken(report) == {"ends"}
+    assert len(report.failures) == 1, "once takes long enough"
+    assert (
+        "separate() yielded more than 1,000 cuts for one point and was stopped; end its loop"
+        in report.summary
+    )
 
 
 def test_a_separator_that_raises_in_setup_is_named() -> None:
@@ -293,6 +380,10 @@ def test_columns_that_are_missing_after_fixing_are_a_case() -> None:
         Cut([0, 10**6], 1),
         Cut([0, 1], 1, [1]),
         Cut([0, 1], 1, [10**30, 1]),
+        Cut([0, 1], 1, 5),  # type: ignore[arg-type]
+        Cut([[0], [0, 1]], 1),
+        Cut([0, 1], 1, proof=[3]),  # type: ignore[arg-type]
+        Cut([0, 1], 1, proof={"set": {3}}),
         ([0, 1], 1),
         None,
     ],

@@ -53,9 +53,7 @@ def list_command(as_json: bool) -> int:
     return 0
 
 
-@separators.command(
-    "check", short_help="Check a cut family against all solutions of small configurations."
-)
+@separators.command("check", short_help="Check a cut family against all solutions of small configurations.")
 @click.argument("separator", metavar="NAME|FILE")
 @click.option("--quiet", is_flag=True, help="Print nothing where the separator passes.")
 def check_command(separator: str, quiet: bool) -> int:
