@@ -11,6 +11,9 @@ such lines it prints the table.
 from __future__ import annotations
 
 import argparse
+import functools
+import json
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -18,7 +21,8 @@ from typing import Any
 
 from bcut.experiments.reporting.runs import Experiment, Run, load_experiment, mean, shifted_geometric_mean
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+HOME = Path(__file__).resolve().parent.parent
+DOCS = HOME / "docs"
 # Shifts of geometric means, in seconds and in nodes.
 SECONDS, NODES = 1.0, 10.0
 
@@ -54,7 +58,7 @@ def foot(experiment: Experiment) -> str:
     machines = {
         (run.record["machine"]["processor"], run.record["machine"]["cores"]) for run in experiment.runs
     }
-    limits = {run.record["settings"]["time_limit"] for run in experiment.runs}
+    limits = {run.record["settings"]["time_limit"] or math.inf for run in experiment.runs}
     versions = " / ".join(
         f"bcut {code['bcut']} (sources {code['sources'][:8]}), SCIP {code['scip']}, HiGHS {code['highs']}"
         for code in map(dict, sorted(codes))
@@ -63,10 +67,10 @@ def foot(experiment: Experiment) -> str:
     missing = f"; {experiment.missing} runs not done" if experiment.missing else ""
     failed = f"; {len(experiment.failures)} failed" if experiment.failures else ""
     plan = f"`experiments/{experiment.manifest['name']}.toml`"
-    seconds = ", ".join(f"{limit:g}" for limit in sorted(limits))
+    seconds = ", ".join("none" if limit == math.inf else f"{limit:g} s" for limit in sorted(limits))
     return (
         f"{len(experiment.runs)} runs of {plan}{missing}{failed}; {versions}; a shared {where}; "
-        f"limit {seconds} s a run; seconds are processor time unless called wall time, and means of them geometric, "
+        f"limit {seconds} a run; seconds are processor time unless called wall time, and means of them geometric, "
         "shifted by one."
     )
 
@@ -148,8 +152,18 @@ def instances(experiment: Experiment) -> str:
         first = next(iter(runs.values()))
         cells = [_outcome(runs.get(name)) for name in experiment.variants]
         name = f"`{key[0]}`, {'minimum' if key[1] == 'min' else 'maximum'}"
-        rows.append((name, number(first.lp), number(first.optimum) or "open", *cells))
+        # Where bounds come from multipliers, or from SCIP after its presolve, no run tells the value of the relaxation.
+        lp = first.lp if first.lp is not None else known_lps().get((first.entry["objective"], *key))
+        rows.append((name, number(lp), number(first.optimum) or "open", *cells))
     return table(("instance", "root LP", "optimum", *experiment.variants), rows)
+
+
+@functools.cache
+def known_lps() -> dict[tuple[str, str, str, bool], float]:
+    """Return the root LPs of the members of the hard set, by objective, instance, sense, and "spanning"."""
+    members = json.loads((HOME / "instances" / "hard-set.json").read_text(encoding="utf-8"))["members"]
+    asked = ("objective", "instance", "sense", "spanning")
+    return {tuple(member[key] for key in asked): member["lp"] for member in members}
 
 
 def _outcome(run: Run | None) -> str:
@@ -208,6 +222,8 @@ def main(arguments: Any = None) -> None:
         if not (folder / plan / "experiment.json").exists():
             continue
         experiment = load_experiment(folder / plan)
+        if not experiment.runs:
+            continue
         text = "\n\n".join(maker(experiment) for maker in makers)
         if not _fill(name, text):
             print(f"{name}\n\n{text}\n")

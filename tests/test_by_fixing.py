@@ -29,9 +29,12 @@ from bcut.geometry.placing import placing_triangulation
 from bcut.geometry.triangulations import count_by_size
 from bcut.instance import load_instance
 from bcut.objectives.objective import make_objective
+from bcut.objectives.syntax import read_objective
 from bcut.solving.api import solve
+from bcut.solving.compact_part import Budget, begin_fixing
 from bcut.solving.memory import Watch, peak_memory, used_memory, watched
 from bcut.solving.methods import expected_columns
+from bcut.solving.search import Search
 
 CASES = [
     ("random:12,2,seed=1", "weight", True, "min"),
@@ -367,3 +370,19 @@ def test_progress_tells_stage_columns_bound_incumbent_and_memory() -> None:
     assert last["memory"]
     bounds = [facts["bound"] for facts in told if facts["bound"] is not None]
     assert bounds == sorted(bounds)
+
+
+def test_local_search_gets_as_much_on_a_busy_machine() -> None:
+    search = Search(
+        whole=begin_fixing(load_instance("cube:3"), read_objective("cardinality", None), spanning=False),
+        make_separators=list,
+    )
+    budget = Budget(search, 0.2)
+    time.sleep(0.3)
+    assert not budget.is_over()
+    while not budget.is_over():
+        pass
+    assert budget.left <= 0
+    # The deadline of the search holds in any case.
+    search.deadline = time.monotonic() - 1
+    assert Budget(search, 100).is_over()

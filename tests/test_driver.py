@@ -384,7 +384,7 @@ def test_a_generator_that_refuses_to_be_closed_is_at_fault() -> None:
             yield Cut([1], 0)
 
     separation = Separation([Scripted(clings)], Problem(FORMULATION), deadline=time.monotonic() + 0.1)
-    with pytest.raises(SeparatorError, match="separator 'scripted': .*generator ignored GeneratorExit"):
+    with pytest.raises(SeparatorError, match=r"separator 'scripted': .*generator ignored GeneratorExit"):
         separation.round(HALVES)
 
 

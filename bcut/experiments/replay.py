@@ -64,7 +64,8 @@ def replay(ledger: Ledger) -> Replay:
     end, problem = ledger.end, ledger.header["problem"]
     if end["lp"] is None:
         raise LedgerError(
-            f"{ledger.label}: records no last relaxation of a root; take one of a variant with preset 'loop' or 'root'"
+            f"{ledger.label}: records no last relaxation of a root; take one of a run with preset 'loop' or 'root' "
+            "that solved one within its time limit"
         )
     configuration = _configuration(ledger)
     name = formulation_name(problem["formulation"], dissection=False)

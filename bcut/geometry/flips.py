@@ -11,7 +11,6 @@ Signs are exact, so every flip leads to a triangulation. Gains are floating-poin
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf
@@ -45,7 +44,7 @@ def improve_by_flips(
     costs_of: CostsOf,
     *,
     spanning: bool,
-    deadline: float | None = None,
+    is_over: Callable[[], bool] | None = None,
 ) -> NDArray[np.int64]:
     """Flip as long as the sum of costs becomes smaller: steepest descent, many flips at a time.
 
@@ -58,8 +57,8 @@ def improve_by_flips(
     costs_of : callable
     spanning : bool
         Whether every point must stay a vertex.
-    deadline : float, optional
-        Value of `time.monotonic` after which the search stops.
+    is_over : callable, optional
+        Tells whether there is no more time.
 
     Returns
     -------
@@ -67,7 +66,7 @@ def improve_by_flips(
         A triangulation whose costs are no larger, in colexicographic order.
     """
     state = _State(np.asarray(simplices, dtype=np.int64), chirotope, costs_of, spanning)
-    while deadline is None or time.monotonic() < deadline:
+    while is_over is None or not is_over():
         chosen = state.best_flips()
         if not chosen:
             break
@@ -85,13 +84,13 @@ def anneal_by_flips(
     spanning: bool,
     steps: int,
     enough: float = -inf,
-    deadline: float | None = None,
+    is_over: Callable[[], bool] | None = None,
 ) -> NDArray[np.int64]:
     """Leave local minima: descend again and again with disturbed costs, the less disturbed the later.
 
     Parameters
     ----------
-    simplices, chirotope, costs_of, spanning, deadline
+    simplices, chirotope, costs_of, spanning, is_over
         As for `improve_by_flips`.
     guide_of : callable
         Costs that lead to good triangulations better than the true ones do, such as roots of reduced costs.
@@ -110,17 +109,17 @@ def anneal_by_flips(
     current = best = np.asarray(simplices, dtype=np.int64)
     least = float(costs_of(best).sum())
     for step in range(steps):
-        if least <= enough or (deadline is not None and time.monotonic() >= deadline):
+        if least <= enough or (is_over is not None and is_over()):
             break
 
         def disturbed(asked: NDArray[np.integer], step: int = step) -> NDArray[np.float64]:
             return guide_of(asked) + (1 - step / steps) * noise_of(asked, step)
 
-        current = improve_by_flips(current, chirotope, disturbed, spanning=spanning, deadline=deadline)
+        current = improve_by_flips(current, chirotope, disturbed, spanning=spanning, is_over=is_over)
         found = float(costs_of(current).sum())
         if found < least:
             best, least = current, found
-    return improve_by_flips(best, chirotope, costs_of, spanning=spanning, deadline=deadline)
+    return improve_by_flips(best, chirotope, costs_of, spanning=spanning, is_over=is_over)
 
 
 class _State:

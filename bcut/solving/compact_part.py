@@ -139,8 +139,7 @@ def improve_incumbent(search: Search) -> None:
         return np.where(columns >= 0, objective.sign * objective.costs[columns], inf)
 
     with search.timed("incumbent"):
-        left = inf if search.seconds_left is None else search.seconds_left
-        seconds = min(_SECONDS_OF_FLIPS, _SHARE_OF_FLIPS * left)
+        budget = Budget(search, _SECONDS_OF_FLIPS)
         if search.columns is None:
             simplices = first_triangulation(program.configuration, program.chirotope)
             _offer(search, program.columns_of(simplices))
@@ -151,7 +150,7 @@ def improve_incumbent(search: Search) -> None:
             program.chirotope,
             costs_of,
             spanning=program.spanning,
-            deadline=time.monotonic() + seconds,
+            is_over=budget.is_over,
         )
         _offer(search, program.columns_of(improved))
 
@@ -185,15 +184,13 @@ def anneal_incumbent(search: Search, reduced_costs: NDArray[np.floating[Any]]) -
         return noise[places % _NOISE]
 
     guide = np.sqrt(np.maximum(reduced_costs, 0.0) * scale)
-    left = inf if search.seconds_left is None else search.seconds_left
     # In proportion to what the relaxations of so many columns are going to take.
-    seconds = min(_SECONDS_OF_FLIPS, len(costs) / _COLUMNS_PER_SECOND)
-    deadline = time.monotonic() + min(seconds, _SHARE_OF_FLIPS * left)
+    budget = Budget(search, min(_SECONDS_OF_FLIPS, len(costs) / _COLUMNS_PER_SECOND))
     enough = -inf if search.bound is None else float(search.bound)
     steps = _STEPS
     with search.timed("incumbent"):
         while float(search.sign * search.whole.objective.value(search.columns)) > enough:
-            started = time.monotonic()
+            before = budget.left
             found = anneal_by_flips(
                 program.simplices[search.columns].astype(np.int64),
                 program.chirotope,
@@ -203,15 +200,40 @@ def anneal_incumbent(search: Search, reduced_costs: NDArray[np.floating[Any]]) -
                 spanning=program.spanning,
                 steps=steps,
                 enough=enough,
-                deadline=deadline,
+                is_over=budget.is_over,
             )
             _offer(search, program.columns_of(found))
             search.report("incumbent", memory=used_memory())
             # Slower cooling ends lower, but a cooling that is cut off ends nowhere.
-            fitting = (deadline - time.monotonic()) / (time.monotonic() - started) * steps
+            fitting = budget.left / max(1e-3, before - budget.left) * steps
             steps = int(min(_SLOWER * steps, fitting))
             if steps < _STEPS or len(program.simplices) < _RELAXED_QUICKLY:
                 break
+
+
+class Budget:
+    """Seconds for local search: of processor time, so that a busy machine gets triangulations as good as an idle one.
+
+    Parameters
+    ----------
+    search : Search
+        Its deadline holds as well, of which local search gets a share.
+    seconds : float
+    """
+
+    def __init__(self, search: Search, seconds: float) -> None:
+        self._end = time.process_time() + seconds
+        left = search.seconds_left
+        self._deadline = inf if left is None else time.monotonic() + _SHARE_OF_FLIPS * left
+
+    @property
+    def left(self) -> float:
+        """Seconds that are left."""
+        return min(self._end - time.process_time(), self._deadline - time.monotonic())
+
+    def is_over(self) -> bool:
+        """Tell whether none are left."""
+        return self.left <= 0
 
 
 def _offer(search: Search, columns: NDArray[np.int64]) -> None:

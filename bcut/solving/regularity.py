@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -14,7 +14,7 @@ from bcut.bounds.linear_program import LinearProgram, LpSolution, solve_linear_p
 from bcut.errors import ResultError, SolverError, VerificationError
 from bcut.geometry.numbers import AlgebraicNumber, number_text, parse_coordinate
 from bcut.verification.exact_points import ExactPoints, Simplex
-from bcut.verification.reading import Source, load_result
+from bcut.verification.reading import Source, load_result, plain_data
 from bcut.verification.regularity import Fold, check_heights, check_irregularity, folds
 from bcut.verification.triangulation import check_triangulation
 
@@ -73,7 +73,7 @@ def regular(result: Source) -> Regularity:
     Raises
     ------
     ResultError
-        If it cannot be read, or has no triangulation.
+        If it cannot be read, has no triangulation, or is about a region.
     VerificationError
         If its simplices are no triangulation.
 
@@ -83,7 +83,13 @@ def regular(result: Source) -> Regularity:
     >>> bcut.regular(bcut.solve("cube:3")).regular
     True
     """
-    data, label = load_result(result)
+    plain, label = plain_data(result)
+    if isinstance(plain, Mapping) and plain.get("kind") == "region":
+        raise ResultError(
+            f"{label}: is about a region, and only triangulations of point configurations can be regular; take a file "
+            "as 'bcut solve --output' wrote it"
+        )
+    data, _ = load_result(result)
     if data.triangulation is None:
         raise ResultError(f"{label}: there is no triangulation in it; solve the instance first")
     points = ExactPoints([[parse_coordinate(text) for text in point] for point in data.points])

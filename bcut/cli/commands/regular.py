@@ -16,7 +16,7 @@ def regular(result: Path, as_json: bool) -> int:
     """Tell whether the triangulation in the file RESULT is regular: the lower side of its points' lifted hull.
 
     A linear program finds heights of the points, or multipliers which prove that there are none; both are checked
-    exactly. Exit status 0: decided, either way; 2: the file has no triangulation.
+    exactly. Exit status 0: decided, either way; 2: the file has no triangulation of a point configuration.
     """
     from bcut.cli.output import emit, emit_json
     from bcut.solving.regularity import regular as call
