@@ -449,14 +449,16 @@ def test_memory_is_limited_for_each_run(tmp_path: Path) -> None:
 
 
 SLEEPING = """
+import signal
 import time
 from bcut import Separator
 
 class Sleeping(Separator):
-    \"\"\"Sleeps.\"\"\"
+    \"\"\"Sleeps, and is not to be woken.\"\"\"
     name = "sleeping"
 
     def separate(self, point):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         time.sleep(60)
         return []
 """

@@ -6,6 +6,7 @@ import csv
 import html.parser
 import json
 import re
+import runpy
 import shutil
 import subprocess
 from math import exp, log
@@ -17,7 +18,7 @@ from laboratory import carried_out
 
 from bcut.cli.main import run
 from bcut.experiments.reporting.report import write_report
-from bcut.experiments.reporting.runs import load_experiment, shifted_geometric_mean
+from bcut.experiments.reporting.runs import Experiment, Run, load_experiment, shifted_geometric_mean
 from bcut.experiments.reporting.tables import all_tables
 
 Captured = pytest.CaptureFixture[str]
@@ -171,10 +172,50 @@ def test_profiles_begin_with_the_fastest_and_end_with_what_is_settled(
         assert [r["factor"] for r in own] == sorted(r["factor"] for r in own)
 
 
+def test_times_of_older_records_do_not_spoil_the_tables(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder, tmp_path / "old")
+    for number, path in enumerate(sorted((tmp_path / "old" / "runs").glob("*.json"))):
+        record = json.loads(path.read_text())
+        if number % 2:
+            record["outcome"]["seconds"]["processor"] = -2.5
+        else:
+            del record["outcome"]["seconds"]["processor"]
+        path.write_text(json.dumps(record))
+    experiment = load_experiment(tmp_path / "old")
+    assert {run.processor_seconds for run in experiment.runs} == {0.0} | {
+        run.seconds for run in experiment.runs if "processor" not in run.outcome["seconds"]
+    }
+    assert {"variants", "times", "profile"} <= all_tables(experiment).keys()
+    path = Path(__file__).resolve().parent.parent / "experiments" / "laboratory_tables.py"
+    script = runpy.run_path(str(path))
+    for maker in ("roots", "solves", "instances", "totals", "foot"):
+        assert script[maker](experiment)
+
+
+def test_root_lps_that_no_run_tells_are_those_of_the_collection() -> None:
+    path = Path(__file__).resolve().parent.parent / "experiments" / "laboratory_tables.py"
+    script = runpy.run_path(str(path))
+    lps = script["known_lps"]()
+    assert len(lps) == 21
+    assert lps["cardinality", "random:30,3,seed=9", "min", True] == pytest.approx(63.58122)
+    entry = {"instance": "random:30,3,seed=9", "objective": "cardinality", "sense": "min", "spanning": True}
+    outcome = {"status": "optimal", "nodes": 0, "seconds": {"total": 9.0, "processor": 7.0}}
+    record = {"outcome": outcome, "settings": {"preset": "solve"}}
+    shown = [Run({**entry, "variant": "it"}, record, 66.0, lp) for lp in (None, 60.25)]
+    for run_, lp in zip(shown, ("63.581", "60.25"), strict=True):
+        experiment = Experiment({"variants": [{"name": "it"}]}, [run_], 0, [])
+        assert f"| `random:30,3,seed=9`, minimum | {lp} | 66 | 7.0 s, 0 nodes |" in script["instances"](
+            experiment
+        )
+
+
 def test_shifted_geometric_means() -> None:
     assert shifted_geometric_mean([], 1.0) is None
     assert shifted_geometric_mean([3.0], 10.0) == pytest.approx(3)
     assert shifted_geometric_mean([0.0, 3.0], 1.0) == pytest.approx(1)
+    # Without the noise of the logarithms.
+    assert [shifted_geometric_mean([0.0] * count, 10.0) for count in range(1, 9)] == [0.0] * 8
+    assert shifted_geometric_mean([-2.0, 3.0], 1.0) == pytest.approx(1)
     values = [0.5, 2.0, 90.0]
     assert shifted_geometric_mean(values, 1.0) == pytest.approx(exp(sum(log(v + 1) for v in values) / 3) - 1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -337,8 +338,82 @@ def test_other_files_are_no_ledgers(tmp_path: Path, content: bytes) -> None:
 @pytest.mark.parametrize("entry", [[[0, 1, 2, 99]], [[0, 1, 2]], [[3, 2, 1, 0]], "x", []])
 def test_a_cut_of_no_simplices_is_refused(made: Made, entry: Any) -> None:
     path = edited(made("loop")[0], lambda entries: first(entries, "link").update(simplices=entry))
-    with pytest.raises(LedgerError, match="is malformed"):
+    with pytest.raises(LedgerError, match=r"is malformed|the 'simplices' of cut 1 is ") as caught:
         check_ledger(read_ledger(path))
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"proof": None}, "line 3: the 'proof' of cut 1 is null, where an object belongs"),
+        ({"taken": 1}, "line 3: the 'taken' of cut 1 is 1, where true or false belongs"),
+        ({"node": True}, "line 3: the 'node' of cut 1 is true, where an integer belongs"),
+        ({"lp_after": "x"}, "line 3: the 'lp_after' of cut 1 is \"x\", where a number or null belongs"),
+        ({"rhs": 0.5}, "cut 1 is malformed: its right-hand side is 0.5, where an integer belongs"),
+        ({"coefficients": [1]}, "cut 1 is malformed: it has 1 coefficients for"),
+    ],
+)
+def test_what_is_wrong_with_a_cut_is_told_with_its_file(
+    made: Made, change: dict[str, Any], says: str, capsys: Captured
+) -> None:
+    path = edited(made("loop")[0], lambda entries: first(entries, "link").update(change))
+    assert run(["cuts", "verify", str(path), "--json"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"Error: {path}")
+    assert says in captured.err
+    (told,) = json.loads(captured.out)["ledgers"]
+    assert told == {"ledger": str(path), "error": captured.err.removeprefix("Error: ").rstrip()}
+
+
+def test_a_ledger_about_other_points_is_told_with_its_file(made: Made, capsys: Captured) -> None:
+    def digest(entries: Entries) -> None:
+        entries[0]["instance"]["points"][0][0] = "7"
+
+    def simplex(entries: Entries) -> None:
+        entries[-1]["at_zero"] = [[0, 1, 99]]
+
+    for change, says in ((digest, "do not have the digest"), (simplex, "speaks of [0, 1, 99]")):
+        path = edited(made("loop")[0], change)
+        assert run(["cuts", "replay", str(path)]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(f"Error: {path}: ")
+        assert says in said
+
+
+def test_several_ledgers_are_verified_and_the_worst_counts(
+    made: Made, tmp_path: Path, capsys: Captured
+) -> None:
+    good, none = str(made("root with cutoff")[0]), tmp_path / "none.gz"
+    broken = tmp_path / "broken.gz"
+    broken.write_bytes(gzip.compress(b"hi\n"))
+    assert run(["cuts", "verify", good, str(made("loop")[0])]) == 0
+    assert capsys.readouterr().out.count("proven again") == 2
+    assert run(["cuts", "verify", str(none), good, str(broken), "--json"]) == 2
+    captured = capsys.readouterr()
+    told = json.loads(captured.out)["ledgers"]
+    assert [Path(one["ledger"]) for one in told] == [none, Path(good), broken]
+    assert ["error" in one for one in told] == [True, False, True]
+    assert f"{none}: there is no such file" in captured.err
+    assert f"{broken}, line 1: is no JSON" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("name", "drop", "says"),
+    [("zero-half", "scip:", "the run found no cuts"), ("zero-half", "link", "nobody knows how to check ")],
+)
+def test_ledgers_with_nothing_to_prove_are_no_failures(
+    made: Made, name: str, drop: str, says: str, capsys: Captured
+) -> None:
+    def change(entries: Entries) -> None:
+        entries[:] = [one for one in entries if not one.get("family", "").startswith(drop)]
+        entries[-1]["final"] = []
+
+    path = edited(made(name)[0], change)
+    assert run(["cuts", "verify", str(path)]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith(f"{path}: nothing to prove: {says}")
+    assert not captured.err
 
 
 def test_cuts_that_take_too_long_are_named_and_not_refused(
@@ -357,15 +432,23 @@ def test_cuts_that_take_too_long_are_named_and_not_refused(
     assert run(["cuts", "verify", str(path)]) == 3
     said = capsys.readouterr().err
     number, reason = next(iter(tired.items()))
-    assert said.startswith(f"Error: {len(tired)} of the cuts were not checked (cut {number}: {reason}")
+    assert said.startswith(
+        f"Error: {path}: {len(tired)} of the cuts were not checked (cut {number}: {reason}"
+    )
     assert "it takes more than 10 steps to check a cut over" in reason
     assert f"none is refused, {checks.proven['clique']} clique" in said
+    assert run(["cuts", "verify", str(path), "--json"]) == 3
+    (told,) = json.loads(capsys.readouterr().out)["ledgers"]
+    assert told["proven"] == checks.proven
+    assert {cut["number"]: cut["reason"] for cut in told["unchecked"]} == tired
     # A refusal is the graver thing.
     other = edited(path, shift_rhs("clique", 1))
     checks = check_ledger(read_ledger(other))
     assert len(checks.refused) == 1
     assert dict(checks.unchecked) == tired
     assert run(["cuts", "verify", str(other)]) == 2
+    for order in ([path, other], [other, path]):
+        assert run(["cuts", "verify", *map(str, order)]) == 2
 
 
 # The commands.
@@ -384,8 +467,17 @@ def test_the_table_shows_what_is_asked_for(made: Made, capsys: Captured) -> None
     shown = cuts_of(ledger, family="link", final=True)
     assert len(lines) == 3 + (len(shown) > 1)
     assert lines[2].split()[1] == "link"
-    assert run(["cuts", "show", path, "--json", "--limit", "2"]) == 0
-    assert capsys.readouterr().out.count('"record": "cut"') == 2
+    assert run(["cuts", "show", path, "--json", "--limit", "2", "--family", "link"]) == 0
+    printed = capsys.readouterr().out
+    told = json.loads(printed)
+    assert told["instance"] == "random:16,3,seed=20"
+    assert told["problem"]["sense"] == "min"
+    assert (told["recorded"], told["chosen"]) == (len(ledger.cuts), len(cuts_of(ledger, family="link")))
+    assert told["cuts"] == cuts_of(ledger, family="link")[:2]
+    # A line for each cut.
+    assert sum('"record": "cut"' in line for line in printed.splitlines()) == 2
+    assert run(["cuts", "show", path, "--json", "--family", "none"]) == 0
+    assert json.loads(capsys.readouterr().out)["cuts"] == []
 
 
 def test_the_commands_say_what_they_did(made: Made, capsys: Captured) -> None:

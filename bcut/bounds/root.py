@@ -218,7 +218,7 @@ class _Loop:
             for cut in cuts:
                 result.separation.confirm(cut)
             if not cuts:
-                result.status = "dry"
+                result.status = "limit" if result.separation.cut_short else "dry"
             return cuts
         return []
 

@@ -181,7 +181,8 @@ def _check(entry: Any, where: str) -> None:
         value = entry[key]
         if not isinstance(value, types) or (isinstance(value, bool) and types is not bool):
             name = f"the '{key}' of cut {entry['number']}" if kind == "cut" else f"'{key}'"
-            known = " or ".join(_NAMES[one] for one in (types if isinstance(types, tuple) else (types,)))
+            several = types if isinstance(types, tuple) else (types,)
+            known = " or ".join(_NAMES[one] for one in several if one is not int or float not in several)
             raise LedgerError(f"{where}: {name} is {json.dumps(value)[:_SHOWN]}, where {known} belongs")
     if kind == "header":
         for key, parts in (("instance", _INSTANCE), ("problem", _PROBLEM)):

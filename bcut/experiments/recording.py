@@ -157,14 +157,15 @@ class Recorder:
         ----------
         bound : RootBound
         among : container, optional
-            Keys of the cuts in the relaxation, where the bound does not tell its cuts.
+            Keys of the cuts in the relaxation, where the bound does not tell its cuts. Those from before columns were
+            fixed may be missing among them.
         """
         assert self.whole is not None
         kept, lp = bound.columns, bound.lp_after_cuts
         # Where a limit came before the cuts of the last round were solved with, the value is that without them; and
         # unknown where columns were fixed meanwhile.
         unsolved = {opened.entry["number"] for opened in self._open}
-        if unsolved and len(kept) < len(self.whole.simplices):
+        if (unsolved or among is not None) and len(kept) < len(self.whole.simplices):
             lp = None
         fixed = np.setdiff1d(np.arange(len(self.whole.simplices)), kept)
         place = np.full(len(self.whole.simplices), -1)

@@ -60,7 +60,7 @@ def sample_vertices(search: Search, part: Part, root: RootBound, target: Fractio
                 limited,
                 Objective("random", "min", costs),
                 # Its relaxations are none of the root's: nobody else watches them.
-                Separation(search.make_separators(), Problem(limited)),
+                Separation(search.make_separators(), Problem(limited), deadline=search.deadline),
                 limits=RootLimits(rounds=_ROUNDS, deadline=search.deadline),
                 cuts=root.cuts,
             )

@@ -163,7 +163,11 @@ class Search:
         if not separators:
             return None
         return Separation(
-            separators, Problem(part.formulation), statistics=self.statistics, observer=self.cut_observer
+            separators,
+            Problem(part.formulation),
+            statistics=self.statistics,
+            observer=self.cut_observer,
+            deadline=self.deadline,
         )
 
 
