@@ -237,6 +237,7 @@ GOOD = GOOD_INSTANCES + GOOD_VARIANTS
         (GOOD + "seed = 1.5\n", r"'seed' is an integer"),
         (GOOD + "ledger = 1\n", r"'ledger' is true or false, not 1"),
         (GOOD + GOOD_VARIANTS, r"has the name 'a' twice"),
+        ('separators = ["link"]\n' + GOOD, r"line 1: .*'separators' is about the protocol 'ablation'; without one"),
         (GOOD_INSTANCES + "[[variants]]\n", r"line 3: .*'name' is missing"),
         ("[[instances]]\n" + GOOD_VARIANTS, r"names one of instance, file and collection"),
         ('[[instances]]\ninstance = "cube:{n}"\n' + GOOD_VARIANTS, r"line 2: .*placeholder \{n\} without a range"),
