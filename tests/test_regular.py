@@ -168,6 +168,11 @@ def test_the_readme_has_an_irregular_one(
     assert "twisted.json: not regular" in capsys.readouterr().out
 
 
+def test_a_result_about_a_region_is_refused_as_one() -> None:
+    with pytest.raises(ResultError, match="is about a region"):
+        bcut.regular(bcut.region("chazelle:1").to_dict())
+
+
 def test_results_without_a_triangulation() -> None:
     with pytest.raises(ResultError, match="no triangulation in it"):
         bcut.regular(bcut.bound("cube:3"))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -215,26 +216,50 @@ def test_ctrl_c_in_the_first_separation_keeps_the_relaxation() -> None:
     assert verify(result.to_dict()).rounded_bound == 17
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
-def test_a_request_to_end_keeps_what_was_found(tmp_path: Path) -> None:
-    (tmp_path / "slow.py").write_text(
+@contextmanager
+def slow_solve(folder: Path, *options: str, ignoring: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+    """A solve whose first separation takes longer than anybody waits for."""
+    (folder / "slow.py").write_text(
         "import time, pathlib\n"
         "from bcut import Separator\n\n\n"
         "class Slow(Separator):\n"
         "    name = 'slow'\n\n"
         "    def separate(self, point):\n"
         "        pathlib.Path('asked').touch()\n"
-        "        time.sleep(60)\n"
+        "        time.sleep(600)\n"
         "        return []\n"
     )
-    command = [sys.executable, "-P", "-m", "bcut", "solve", FRACTIONAL["instance"], "--spanning"]
-    command += ["--separator", "./slow.py", "--output", "found.json"]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        while not (tmp_path / "asked").exists():
-            assert process.poll() is None
-            time.sleep(0.05)
+    command = [sys.executable, "-P", "-m", "bcut", "solve", str(FRACTIONAL["instance"]), "--spanning"]
+    command += ["--separator", "./slow.py", "--output", "found.json", *options]
+    # As a shell does without job control, for what it starts in the background.
+    ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if ignoring else None
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=ignore
+    ) as process:
+        try:
+            while not (folder / "asked").exists():
+                assert process.poll() is None
+                time.sleep(0.05)
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
+@pytest.mark.parametrize("ignoring", [False, True])
+def test_a_request_to_end_keeps_what_was_found(tmp_path: Path, ignoring: bool) -> None:
+    with slow_solve(tmp_path, ignoring=ignoring) as process:
         process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 130
+        assert process.wait(60) == 130
     result = json.loads((tmp_path / "found.json").read_text())
     assert (result["status"], result["bound"]) == ("interrupted", 17)
     verify(result)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
+def test_a_time_limit_holds_in_the_background_of_a_script(tmp_path: Path) -> None:
+    with slow_solve(tmp_path, "--time-limit", "2", ignoring=True) as process:
+        process.send_signal(signal.SIGINT)  # for others
+        assert process.wait(60) == 3
+    result = json.loads((tmp_path / "found.json").read_text())
+    assert (result["status"], result["bound"]) == ("limit", 17)

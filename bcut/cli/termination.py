@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -17,10 +16,12 @@ def terminable() -> Iterator[None]:
     """
 
     def end(*_: object) -> None:
+        from bcut.solving.memory import interrupt
+
         # Jobs in the background of a script ignore Ctrl-C, and would ignore this as well.
         if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        os.kill(os.getpid(), signal.SIGINT)
+        interrupt()
 
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -74,7 +74,9 @@ def read_plan(path: Path | str) -> Plan:
     cases = read_cases(top, folder)
     protocol = top.text("protocol", choices=PROTOCOLS) if "protocol" in top.entries else ""
     if "separators" in top.entries and not protocol:
-        top.refuse("separators", "is about the protocol 'ablation'; without one, write it in each of [[variants]]")
+        top.refuse(
+            "separators", "is about the protocol 'ablation'; without one, write it in each of [[variants]]"
+        )
     variants: list[Variant] = []
     if protocol:
         variants += ablation(top, folder)

@@ -14,6 +14,9 @@ from pathlib import Path
 
 GIB = 1 << 30
 
+# Whether an interrupt is on its way that comes from this process itself.
+_MEANT = threading.Event()
+
 # Seconds between two looks, and those that a stage has after the deadline to end by itself.
 _PERIOD, _GRACE = 0.05, 1.0
 
@@ -49,6 +52,12 @@ def peak_memory() -> int:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     # Bytes on macOS, kibibytes elsewhere.
     return int(peak) if sys.platform == "darwin" else int(peak) * 1024
+
+
+def interrupt() -> None:
+    """Interrupt the main thread as Ctrl-C does; a block that is `watched` hears it even where Ctrl-C is ignored."""
+    _MEANT.set()
+    os.kill(os.getpid(), signal.SIGINT)
 
 
 @contextmanager
@@ -87,8 +96,18 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
                 watch.reached = "time"
             else:
                 continue
-            os.kill(os.getpid(), signal.SIGINT)
+            interrupt()
 
+    def heed(*_: object) -> None:
+        if _MEANT.is_set():
+            _MEANT.clear()
+            raise KeyboardInterrupt
+
+    # Jobs that a script starts in the background ignore Ctrl-C, which is for others; limits are for them.
+    _MEANT.clear()
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    if ignored:
+        signal.signal(signal.SIGINT, heed)
     previous = sys.unraisablehook
 
     def hook(unraisable: sys.UnraisableHookArgs) -> None:
@@ -106,3 +125,5 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
         ended.set()
         watcher.join()
         sys.unraisablehook = previous
+        if ignored:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
