@@ -326,11 +326,10 @@ def test_lifted_odd_cycles_close_the_gap(instance: str, before: float, after: fl
 
 def test_cliques_close_half_of_a_gap() -> None:
     formulation = cocircuit_formulation(build("random:20,3,seed=1001"), spanning=True)
-    bound, separation = loop(formulation, make_objective("cardinality", formulation), "clique")
+    bound, _ = loop(formulation, make_objective("cardinality", formulation), "clique")
     assert bound.lp == pytest.approx(34 + 1 / 3)
     assert bound.lp_after_cuts is not None
     assert bound.lp_after_cuts > 34.49
-    assert separation.statistics["clique"].seconds < 5
 
 
 # --- convex-polygon ---------------------------------------------------------------------------------------

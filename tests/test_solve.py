@@ -210,10 +210,9 @@ def test_gaps_are_closed_at_every_scale_of_costs(tmp_path: Path, number: int, sc
     formulation, objective, optimum = with_gap(number, sense)
     costs = [str(int(cost) * scale) for cost in objective.numerators]
     text = costs_file(tmp_path, formulation.configuration, costs, spanning=True)
-    started = time.monotonic()
     result = bcut.solve(formulation.configuration, objective=text, spanning=True, sense=sense, separators=[])
     # Where values lie far apart, targets must not be tried one by one.
-    assert time.monotonic() - started < 10
+    assert len(result.root.rounds) < 100
     assert result.status == "optimal"
     assert verify(result).value == optimum * Fraction(scale)
     assert result.bound == pytest.approx(float(optimum * Fraction(scale)), rel=1e-6)
