@@ -310,7 +310,7 @@ MALFORMED = [
     (lambda point: [Cut([0, 1], 1, [1])], "2 simplices but 1 coefficients"),
     (lambda point: [Cut([0, 1], -1, [0, 0])], "coefficients are all zero"),
     (lambda point: [([0, 1], 1)], "must yield Cut objects, not tuple"),
-    (lambda point: None, "separate.. raised TypeError"),
+    (lambda point: None, "separate.. returned None; yield Cuts"),
 ]
 
 
