@@ -101,13 +101,10 @@ def _check_consistency(
     configuration: PointConfiguration, question: Question, search: Search, proven: Fraction | None
 ) -> None:
     """Refuse what contradicts itself: a cut that is not valid, or a solver that errs, leads to such results."""
-    blame = "a solver erred"
-    foreign = [name for name in question.separators if not is_built_in(name)]
-    if foreign:
-        blame = f"cuts of {', '.join(foreign)} are not valid (see `bcut separators check`), or " + blame
     if search.status == "infeasible" and not search.restricted and question.invariant_under is None:
         raise SolverError(
-            f"{configuration.name}: the search ended without a triangulation, though there is always one: {blame}"
+            f"{configuration.name}: the search ended without a triangulation, though there is always one: "
+            + _blame(question)
         )
     value, sign = search.value, search.sign
     if value is None or proven is None:
@@ -117,8 +114,14 @@ def _check_consistency(
     if sign * value < sign * proven - room:
         raise SolverError(
             f"{configuration.name}: the bound {as_number(proven)} is refuted by a triangulation of the value "
-            f"{as_number(value)}: {blame}"
+            f"{as_number(value)}: {_blame(question)}"
         )
+
+
+def _blame(question: Question) -> str:
+    foreign = ", ".join(name for name in question.separators if not is_built_in(name))
+    cuts = f"cuts of {foreign} are not valid (see `bcut separators check`), or " if foreign else ""
+    return f"{cuts}a solver erred"
 
 
 def _describe_instance(configuration: PointConfiguration) -> Instance:
@@ -163,8 +166,7 @@ def _certified(search: Search, certificate: Certificate) -> Fraction | None:
         return sign * Fraction(certificate.threshold)
     if certificate.bound is None:
         return None
-    unit = search.whole.objective.unit if search.unit is None else search.unit
-    integral = unit.denominator == 1
+    integral = search.value_unit.denominator == 1
     proven = sign * Fraction(certificate.bound)
     proven = Fraction(ceil(proven)) if integral else proven
     refuted = certificate.refutes

@@ -135,6 +135,11 @@ class Search:
         if self.bound is None or bound > self.bound:
             self.bound = bound
 
+    @property
+    def value_unit(self) -> Fraction:
+        """A number of which every value is an integral multiple."""
+        return self.whole.objective.unit if self.unit is None else self.unit
+
     def rounded_up(self, bound: Fraction) -> Fraction:
         """Round a bound on ``sign * objective`` up to the next value that a triangulation can have."""
         if self.unit is None:

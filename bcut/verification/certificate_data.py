@@ -149,11 +149,6 @@ class CertifiedBound:
     obstacle: str = ""
     refuted: Fraction | None = None
 
-    @property
-    def is_checked(self) -> bool:
-        """Whether the bound was re-computed."""
-        return self.bound is not None
-
     def beyond(self, target: Fraction, sign: int) -> CertifiedBound:
         """Return what holds where no triangulation reaches a target either."""
         # Between integral values there is nothing: the next one is a bound.
