@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +13,7 @@ from typing import Any
 
 import pytest
 from laboratory import plan_file, tasks_from
+from processes import BCUT, on_terminal, started
 
 from bcut.cli.main import run
 from bcut.errors import ExperimentError, InputError, PlanError
@@ -31,7 +29,7 @@ from bcut.instance import load_instance
 from bcut.separation.resolve import built_in_names
 
 Captured = pytest.CaptureFixture[str]
-COMMAND = [sys.executable, "-m", "bcut", "experiment", "run"]
+COMMAND = [*BCUT, "experiment", "run"]
 
 ONE = """
 [[instances]]
@@ -450,6 +448,7 @@ def test_memory_is_limited_for_each_run(tmp_path: Path) -> None:
 
 
 SLEEPING = """
+import pathlib
 import signal
 import time
 from bcut import Separator
@@ -460,7 +459,24 @@ class Sleeping(Separator):
 
     def separate(self, point):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        time.sleep(60)
+        pathlib.Path(__file__).with_suffix(".asleep").touch()
+        time.sleep(600)
+        return []
+"""
+
+# Its runs do not end before somebody removes a file.
+HOLDING = """
+import pathlib
+import time
+from bcut import Separator
+
+class Holding(Separator):
+    \"\"\"Waits until it is released.\"\"\"
+    name = "holding"
+
+    def separate(self, point):
+        while pathlib.Path(__file__).with_suffix(".hold").exists():
+            time.sleep(0.05)
         return []
 """
 
@@ -480,14 +496,13 @@ def test_a_run_ends_with_the_program_that_started_it(tmp_path: Path) -> None:
     (tmp_path / "sleeping.py").write_text(SLEEPING)
     (task,) = tasks_from(tmp_path, ONE.replace('"link"]', '"./sleeping.py"]'))
     command = [sys.executable, "-m", "bcut.experiments.execute", str(tmp_path)]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE)
-    assert process.stdin is not None
-    process.stdin.write(json.dumps(task.data).encode() + b"\n")
-    process.stdin.flush()
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.wait(1.5)
-    process.stdin.close()
-    assert process.wait(10) == 3
+    reading, writing = os.pipe()
+    with open(writing, "wb") as pipe, open(reading, "rb") as end, started(command, stdin=end) as program:
+        pipe.write(json.dumps(task.data).encode() + b"\n")
+        pipe.flush()
+        program.until((tmp_path / "sleeping.asleep").exists)
+        pipe.close()
+        assert program.end().status == 3
 
 
 def test_without_distributed_the_runs_go_through_threads(
@@ -500,24 +515,19 @@ def test_without_distributed_the_runs_go_through_threads(
     assert run_experiment(path, tmp_path / "out").done == 1
 
 
-def wait_for(condition: Any, seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "nothing happened"
-        time.sleep(0.05)
-
-
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_what_is_interrupted_or_killed_goes_on_where_it_was(tmp_path: Path, how: signal.Signals) -> None:
-    path, out = plan_file(tmp_path, SEVERAL), tmp_path / "out"
-    command = [*COMMAND, str(path), "--output", str(out), "--workers", "1"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_for(lambda: list((out / "runs").glob("*.json")) if out.exists() else [])
-    process.send_signal(how)
-    said, _ = process.communicate(timeout=30)
+    (tmp_path / "holding.py").write_text(HOLDING)
+    (tmp_path / "holding.hold").touch()
+    path, out = plan_file(tmp_path, SEVERAL.replace('"link"]', '"./holding.py"]')), tmp_path / "out"
+    with started([*COMMAND, str(path), "--output", str(out), "--workers", "1"]) as program:
+        program.until(lambda: list((out / "runs").glob("*.json")))
+        program.signal(how)
+        ended = program.end()
     if how == signal.SIGINT:
-        assert process.returncode == 130
-        assert "not run" in said
+        assert ended.status == 130
+        assert "not run" in ended.out
+    (tmp_path / "holding.hold").unlink()
     before = {p: p.stat().st_mtime_ns for p in (out / "runs").glob("*.json")}
     assert 1 <= len(before) < 6
     progress = run_experiment(path, out)
@@ -536,29 +546,11 @@ def test_two_processes_do_not_run_one_experiment(tmp_path: Path) -> None:
 
 def test_a_terminal_shows_a_bar_with_the_time_left(tmp_path: Path) -> None:
     path = plan_file(tmp_path, ONE)
-    ours, theirs = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "140"}
-    process = subprocess.Popen(
-        [*COMMAND, str(path), "--output", str(tmp_path / "out")],
-        stderr=theirs,
-        stdout=subprocess.PIPE,
-        env=environment,
-    )
-    os.close(theirs)
-    shown = b""
-    while True:
-        try:
-            part = os.read(ours, 4096)
-        except OSError:  # the other side is closed
-            break
-        if not part:
-            break
-        shown += part
-    os.close(ours)
-    assert process.communicate()[0].endswith(b"1 runs, 0 stored before, 1 done, 0 failed\n")
-    assert process.returncode == 0
-    assert b"0/1" in shown
-    assert b"left" in shown
+    status, out, shown = on_terminal([*COMMAND, str(path), "--output", str(tmp_path / "out")], columns=140)
+    assert status == 0
+    assert out.endswith("1 runs, 0 stored before, 1 done, 0 failed\n")
+    assert "0/1" in shown
+    assert "left" in shown
 
 
 def test_an_empty_folder_has_no_report(tmp_path: Path, capsys: Captured) -> None:

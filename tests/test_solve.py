@@ -6,8 +6,7 @@ import json
 import re
 import shutil
 import subprocess
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -378,21 +377,19 @@ def test_no_time_at_all_still_gives_a_triangulation(method: str, sense: str, obj
 
 
 def test_a_time_limit_keeps_the_triangulation() -> None:
-    started = time.monotonic()
     result = bcut.solve("dodecahedron", sense="max", time_limit=1.5, method="scip")
-    assert time.monotonic() - started < 10
     assert result.status == "limit"
     assert result.value is not None
     assert result.bound is None or result.bound >= result.value
     verify(result)
 
 
-def test_a_time_limit_in_the_root_keeps_the_bound() -> None:
+def test_a_time_limit_in_the_root_keeps_the_bound(time_is_up: Callable[[], None]) -> None:
     def slow(point: FractionalPoint) -> Iterator[Cut]:
-        time.sleep(1.5)
+        time_is_up()
         yield from ()
 
-    result = bcut.solve("random:12,3,seed=1000", spanning=True, separators=[Scripted(slow)], time_limit=1)
+    result = bcut.solve("random:12,3,seed=1000", spanning=True, separators=[Scripted(slow)], time_limit=900)
     assert result.status == "limit"
     assert result.bound == 17
     assert result.root.lp == pytest.approx(16.5)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -16,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles import Scripted
+from processes import BCUT, TIME_IS_UP, Started, started
 
 import bcut
 from bcut.errors import SolverError
@@ -217,49 +216,46 @@ def test_ctrl_c_in_the_first_separation_keeps_the_relaxation() -> None:
 
 
 @contextmanager
-def slow_solve(folder: Path, *options: str, ignoring: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+def slow_solve(
+    folder: Path, *options: str, ignoring: bool = False, then: str = "time.sleep(600)"
+) -> Iterator[Started]:
     """A solve whose first separation takes longer than anybody waits for."""
     (folder / "slow.py").write_text(
-        "import time, pathlib\n"
+        "import pathlib, signal, time\n"
         "from bcut import Separator\n\n\n"
         "class Slow(Separator):\n"
         "    name = 'slow'\n\n"
         "    def separate(self, point):\n"
         "        pathlib.Path('asked').touch()\n"
-        "        time.sleep(600)\n"
+        f"        {then}\n"
         "        return []\n"
     )
-    command = [sys.executable, "-P", "-m", "bcut", "solve", str(FRACTIONAL["instance"]), "--spanning"]
+    # Its bound is below its optimum, 46: no lucky start spares the separation.
+    command = [*BCUT, "solve", "random:22,3,seed=9", "--spanning"]
     command += ["--separator", "./slow.py", "--output", "found.json", *options]
     # As a shell does without job control, for what it starts in the background.
     ignore = (lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) if ignoring else None
-    with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=ignore
-    ) as process:
-        try:
-            while not (folder / "asked").exists():
-                assert process.poll() is None
-                time.sleep(0.05)
-            yield process
-        finally:
-            process.kill()
+    with started(command, cwd=folder, preexec_fn=ignore) as program:
+        program.until((folder / "asked").exists)
+        yield program
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
 @pytest.mark.parametrize("ignoring", [False, True])
 def test_a_request_to_end_keeps_what_was_found(tmp_path: Path, ignoring: bool) -> None:
-    with slow_solve(tmp_path, ignoring=ignoring) as process:
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(60) == 130
+    with slow_solve(tmp_path, ignoring=ignoring) as program:
+        program.signal(signal.SIGTERM)
+        assert program.end().status == 130
     result = json.loads((tmp_path / "found.json").read_text())
-    assert (result["status"], result["bound"]) == ("interrupted", 17)
+    assert (result["status"], result["bound"]) == ("interrupted", 45)
     verify(result)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
 def test_a_time_limit_holds_in_the_background_of_a_script(tmp_path: Path) -> None:
-    with slow_solve(tmp_path, "--time-limit", "2", ignoring=True) as process:
-        process.send_signal(signal.SIGINT)  # for others
-        assert process.wait(60) == 3
+    # Ctrl-C is for others there; the time is up then.
+    then = f"signal.raise_signal(signal.SIGINT); {TIME_IS_UP}; time.sleep(600)"
+    with slow_solve(tmp_path, "--time-limit", "900", ignoring=True, then=then) as program:
+        assert program.end().status == 3
     result = json.loads((tmp_path / "found.json").read_text())
-    assert (result["status"], result["bound"]) == ("limit", 17)
+    assert (result["status"], result["bound"]) == ("limit", 45)
