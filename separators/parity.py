@@ -21,6 +21,7 @@ formulation, complete ones, with no rounding of coefficients.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,6 +66,10 @@ class Parity(Separator):
         matrix = formulation.matrix[checks][:, : len(problem.simplices)]
         self.rows = abs(matrix).tocsr()
         self.columns = self.rows.tocsc()
+        starts, indices, odd = self.rows.indptr, self.rows.indices, self.rows.data % 2 == 1
+        self.odd = [
+            indices[start:end][odd[start:end]] for start, end in pairwise(starts)
+        ]
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
         """Yield the most violated cut of every row of the eliminated system, most violated first."""
@@ -108,7 +113,9 @@ class Parity(Separator):
 
     def _cut(self, combination: NDArray[np.intp], x: NDArray[np.floating]) -> tuple[float, Cut] | None:
         """Return the most violated cut of a sum of rows, with its violation."""
-        occurrences = np.asarray(self.rows[combination].sum(axis=0)).reshape(-1)
+        if not len(combination):
+            return None
+        occurrences = np.bincount(np.concatenate([self.odd[row] for row in combination]))
         members = np.flatnonzero(occurrences & 1)
         if not len(members) or len(members) > self.max_support:
             return None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 import bcut
@@ -62,8 +65,17 @@ def test_averaged_link_cuts_close_the_gap_of_the_dodecahedron() -> None:
     assert bcut.bound("dodecahedron", method="orbits").root.lp_after_cuts == pytest.approx(23, abs=1e-6)
 
 
-def test_a_time_limit_leaves_a_triangulation_and_a_bound() -> None:
-    result = bcut.solve("icosidodecahedron", sense="max", method="orbits", time_limit=3)
+def test_a_time_limit_leaves_a_triangulation_and_a_bound(
+    monkeypatch: pytest.MonkeyPatch, time_is_up: Callable[[], None]
+) -> None:
+    reach = by_orbits._reach
+
+    def too_late(*arguments: Any) -> str:
+        time_is_up()
+        return reach(*arguments)
+
+    monkeypatch.setattr(by_orbits, "_reach", too_late)
+    result = bcut.solve("icosidodecahedron", sense="max", method="orbits", time_limit=3600)
     assert result.status == "limit"
     assert result.triangulation is not None
     assert result.value <= result.bound

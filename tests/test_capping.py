@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,7 +83,13 @@ def test_fractions_are_capped_exactly() -> None:
 
 @pytest.mark.parametrize(
     ("costs", "sense"),
-    [([1.0, 2.0, 900.0], "min"), ([-1.0, 2.0, 1e12], "min"), ([1.0, 2.0, 1e12], "max"), ([0.0], "min")],
+    [
+        ([1.0, 2.0, 900.0], "min"),
+        ([-1.0, 2.0, 30.0], "min"),
+        ([-1e12, 2.0, 1e12], "min"),
+        ([1.0, 2.0, 1e12], "max"),
+        ([0.0], "min"),
+    ],
 )
 def test_other_costs_are_left_alone(costs: list[float], sense: str) -> None:
     search = search_for(costs, sense)
@@ -89,6 +97,71 @@ def test_other_costs_are_left_alone(costs: list[float], sense: str) -> None:
     with capped_costs(search):
         assert search.whole is whole
         assert search.columns is None
+
+
+def test_negative_costs_make_room_for_what_they_gain() -> None:
+    search = search_for([-1.0, 2.0, 1e12])
+    gained = float(np.abs(np.minimum(search.whole.objective.costs, 0)).sum())
+    with capped_costs(search):
+        assert search.value is not None
+        size = abs(float(search.value)) + gained
+        assert 2 * size <= search.whole.objective.largest_cost <= 4 * size
+
+
+@pytest.mark.parametrize("method", ["listing", "scip", "orbits"])
+@pytest.mark.parametrize(("case", "least"), [(0, 0), (1, 1), (2, -3), (3, 0)])
+def test_prices_that_keep_simplices_out(method: str, case: int, least: int, tmp_path: Path) -> None:
+    """Costs of a few units beside 10^10 for what is not wanted: SCIP would take the former for zero."""
+    configuration = load_instance(f"random:9,2,seed={case}")
+    formulation = cocircuit_formulation(configuration)
+    rng = np.random.default_rng(case)
+    table = [
+        [simplex, int(cost) + 0.5 * int(half)]
+        for simplex, cost, half in zip(
+            formulation.simplices.tolist(),
+            rng.integers(least, 5, formulation.size[0]),
+            rng.integers(0, 2, formulation.size[0]),
+            strict=True,
+        )
+        if rng.random() < 0.7
+    ]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"default": 10**10, "costs": table}))
+    objective = make_objective(f"costs:{file}", formulation)
+    best = min(objective.value(chosen) for chosen in triangulations(formulation.chirotope))
+    assert abs(best) < 10**4
+    result = bcut.solve(configuration, objective=f"costs:{file}", method=method)
+    assert (result.status, result.value) == ("optimal", float(best))
+    assert verify(result).value == best
+
+
+@pytest.mark.parametrize("method", ["listing", "scip", "orbits"])
+@pytest.mark.parametrize("sense", ["min", "max"])
+def test_costs_that_cancel_are_not_called_optimal_before_they_are(
+    method: str, sense: Any, tmp_path: Path
+) -> None:
+    """Areas times 10^13, less their mean, add up to nothing: beside them solvers do not see what differs."""
+    configuration = load_instance("random:9,2,seed=1")
+    formulation = cocircuit_formulation(configuration, spanning=True)
+    every = list(triangulations(formulation.chirotope, spanning=True))
+    volumes = make_objective("volume", formulation)
+    mean = volumes.value(every[0]) / len(every[0])
+    small = np.random.default_rng(1).integers(0, 9, formulation.size[0]).tolist()
+    table = [
+        [simplex, str((volumes.value([column]) / mean - 1) * 10**13 + small[column])]
+        for column, simplex in enumerate(formulation.simplices.tolist())
+    ]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": table}))
+    values = [sum(small[column] for column in chosen) for chosen in every]
+    best = min(values) if sense == "min" else max(values)
+    result = bcut.solve(configuration, objective=f"costs:{file}", spanning=True, method=method, sense=sense)
+    assert result.value is not None
+    assert result.value in values
+    assert result.bound is not None
+    assert result.bound <= best if sense == "min" else result.bound >= best
+    assert (result.status == "optimal") <= (result.value == best)
+    assert verify(result).value == result.value
 
 
 def test_the_other_sense() -> None:

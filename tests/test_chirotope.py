@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from reference import configuration_or_none, on_hull, orientation
+from reference import configuration_or_none, integral, on_hull, orientation
 
 from bcut.errors import TooLargeError
 from bcut.geometry import chirotope as chirotope_module
@@ -25,7 +25,7 @@ def small_points(d: int, most: int = 3) -> st.SearchStrategy[list[list[int]]]:
 def test_sides_and_facets_of_degenerate_points(values: list[list[int]]) -> None:
     configuration = configuration_or_none(values)
     assume(configuration is not None)
-    points = configuration.scalars()
+    points = integral(configuration.scalars())
     chirotope = Chirotope.of(configuration)
     n, d = configuration.n, configuration.dimension
     planes = set()

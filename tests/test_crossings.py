@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from reference import signed_volume
+from reference import integral, signed_volume
 
 from bcut.families import build
 from bcut.geometry import crossings as crossings_module
@@ -20,39 +20,59 @@ from bcut.geometry.subsets import all_subsets, ranks
 from bcut.geometry.triangulations import triangulations
 
 
-def largest(objective: list[Fraction], rows: list[list[Any]], rhs: list[Any]) -> Fraction | None:
-    """Maximise over ``rows x = rhs``, x >= 0, by the simplex method with Bland's rule; None if infeasible."""
+def largest(objective: list[int], rows: list[list[Any]], rhs: list[Any]) -> Any:
+    """Maximise over ``rows x = rhs``, x >= 0, by the simplex method with Bland's rule; None if infeasible.
+
+    Integers remain integers: the table is then kept over one denominator, the last pivot.
+    """
     columns = len(objective)
     table = [
         [*row, value] if value >= 0 else [-v for v in (*row, value)]
         for row, value in zip(rows, rhs, strict=True)
     ]
     for i, row in enumerate(table):
-        row[columns:columns] = [Fraction(int(i == j)) for j in range(len(table))]
+        row[columns:columns] = [int(i == j) for j in range(len(table))]
     basis = list(range(columns, columns + len(table)))
+    whole = all(isinstance(value, int) for row in table for value in row)
+    if not whole:
+        table = [[Fraction(value) if isinstance(value, int) else value for value in row] for row in table]
+    denominator = 1
 
-    def optimise(costs: list[Fraction], usable: int) -> Fraction:
+    def enter(i: int, column: int) -> None:
+        nonlocal denominator
+        pivot, basis[i] = table[i][column], column
+        if whole:
+            chosen = table[i] = table[i] if pivot > 0 else [-value for value in table[i]]
+            pivot = abs(pivot)
+        else:
+            inverse = 1 / pivot
+            chosen = table[i] = [value * inverse for value in table[i]]
+        for k, row in enumerate(table):
+            share = row[column]
+            if k != i and whole:
+                table[k] = [(pivot * a - share * b) // denominator for a, b in zip(row, chosen, strict=True)]
+            elif k != i and share:
+                table[k] = [a - share * b for a, b in zip(row, chosen, strict=True)]
+        denominator = pivot if whole else 1
+
+    def optimise(costs: list[int], usable: int) -> Any:
         while True:
-            reduced = [
-                costs[j] - sum(costs[b] * row[j] for b, row in zip(basis, table, strict=True))
-                for j in range(usable)
-            ]
-            entering = next((j for j in range(usable) if reduced[j] > 0), None)
+            priced = [(costs[b], row) for b, row in zip(basis, table, strict=True) if costs[b]]
+            entering = next(
+                (j for j in range(usable) if costs[j] * denominator > sum(c * row[j] for c, row in priced)),
+                None,
+            )
             if entering is None:
-                return sum((costs[b] * row[-1] for b, row in zip(basis, table, strict=True)), Fraction(0))
+                return sum(c * row[-1] for c, row in priced) / Fraction(denominator)
             ratios = [
-                (row[-1] / row[entering], basis[i], i) for i, row in enumerate(table) if row[entering] > 0
+                ((Fraction(row[-1], row[entering]) if whole else row[-1] / row[entering]), basis[i], i)
+                for i, row in enumerate(table)
+                if row[entering] > 0
             ]
             assert ratios, "the program is bounded"
-            leaving = min(ratios)[2]
-            pivot = table[leaving][entering]
-            table[leaving] = [value / pivot for value in table[leaving]]
-            for i, row in enumerate(table):
-                if i != leaving and row[entering]:
-                    table[i] = [a - row[entering] * b for a, b in zip(row, table[leaving], strict=True)]
-            basis[leaving] = entering
+            enter(min(ratios)[2], entering)
 
-    artificial = [Fraction(0)] * columns + [Fraction(-1)] * len(table)
+    artificial = [0] * columns + [-1] * len(table)
     if optimise(artificial, columns + len(table)) < 0:
         return None
     # Artificial columns stay at 0: a pivot in their rows is free.
@@ -60,12 +80,8 @@ def largest(objective: list[Fraction], rows: list[list[Any]], rhs: list[Any]) ->
         if basis[i] >= columns:
             entering = next((j for j in range(columns) if row[j]), None)
             if entering is not None:
-                table[i] = [value / row[entering] for value in row]
-                for k, other in enumerate(table):
-                    if k != i and other[entering]:
-                        table[k] = [a - other[entering] * b for a, b in zip(other, table[i], strict=True)]
-                basis[i] = entering
-    return optimise([*objective, *[Fraction(0)] * len(table)], columns)
+                enter(i, entering)
+    return optimise([*objective, *[0] * len(table)], columns)
 
 
 def meet_badly(points: Sequence[Sequence[Any]], first: Sequence[int], second: Sequence[int]) -> bool:
@@ -76,10 +92,10 @@ def meet_badly(points: Sequence[Sequence[Any]], first: Sequence[int], second: Se
     """
     dimension = len(points[0])
     rows = [[points[v][i] for v in first] + [-points[v][i] for v in second] for i in range(dimension)]
-    rows.append([Fraction(1)] * len(first) + [Fraction(0)] * len(second))
-    rows.append([Fraction(0)] * len(first) + [Fraction(1)] * len(second))
-    rhs = [Fraction(0)] * dimension + [Fraction(1), Fraction(1)]
-    objective = [Fraction(int(v not in second)) for v in first] + [Fraction(0)] * len(second)
+    rows.append([1] * len(first) + [0] * len(second))
+    rows.append([0] * len(first) + [1] * len(second))
+    rhs = [0] * dimension + [1, 1]
+    objective = [int(v not in second) for v in first] + [0] * len(second)
     value = largest(objective, rows, rhs)
     return value is not None and value > 0
 
@@ -101,7 +117,7 @@ def meet_badly(points: Sequence[Sequence[Any]], first: Sequence[int], second: Se
 )
 def test_crossing_is_meeting_outside_a_common_face(instance: str) -> None:
     configuration = build(instance)
-    points = configuration.scalars()
+    points = integral(configuration.scalars())
     simplices = Chirotope.of(configuration).bases
     crossing = crossing_matrix(Chirotope.of(configuration), simplices)
     pairs = list(combinations(range(len(simplices)), 2))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from reference import configuration_or_none, determinant, orientation, sign
+from reference import configuration_or_none, determinant, integral, orientation, sign
 
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.determinants import _differences, _Kernel, determinants, orientation_signs
@@ -19,7 +19,7 @@ from bcut.geometry.subsets import all_subsets
 
 
 def assert_exact(configuration: PointConfiguration) -> None:
-    points = configuration.scalars()
+    points = integral(configuration.scalars())
     tuples = all_subsets(configuration.n, configuration.dimension + 1)
     expected = [orientation(points, row) for row in tuples.tolist()]
     assert orientation_signs(configuration, tuples).tolist() == expected

@@ -108,11 +108,16 @@ def test_sizes_in_general_position_follow_the_binomial_coefficients(n: int, dime
     assert one.kinds == {"face": lattice, "pair": comb(n, dimension + 2), "volume": 2}
 
 
-def test_counting_ends_at_the_deadline() -> None:
+def test_counting_ends_at_the_deadline(tmp_path: Path) -> None:
     points = load_instance("random:8,2,seed=1")
     assert full_size("0", points, spanning=False, deadline=0.0) is None
-    counted = sizes.count("0", points, False, 0.0)
-    assert (counted["status"], counted["rows"]) == ("limit", None)
+    (task,) = tasks_from(
+        tmp_path,
+        'time_limit = 1e-9\n[[instances]]\ninstance = "random:8,2,seed=1"\nformulation = "0"\n'
+        '[[variants]]\nname = "count"\npreset = "sizes"\n',
+    )
+    outcome = carry_out(task.data)[0]["outcome"]
+    assert (outcome["status"], outcome["rows"], outcome["kinds"]) == ("limit", None, None)
 
 
 # Plans.

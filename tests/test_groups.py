@@ -148,3 +148,32 @@ def test_what_cannot_be_is_said(options: dict[str, object], reason: str) -> None
 
 def test_arrays_do_as_well() -> None:
     assert bcut.solve("cube:3", invariant_under=np.array([EXCHANGE])).status == "optimal"
+
+
+@pytest.mark.parametrize("sense", ["min", "max"])
+@pytest.mark.parametrize("unit", [1.0, 0.1, 1e-12])
+def test_invariant_optima_of_costs_without_a_common_unit(unit: float, sense: str, tmp_path: Path) -> None:
+    """The least invariant value may be billions of units of doubles above the bound."""
+    configuration = bcut.load_instance("grid:3,3")
+    rotation = [6, 3, 0, 7, 4, 1, 8, 5, 2]
+    half = [rotation[image] for image in rotation]
+    chirotope = Chirotope.of(configuration)
+    costs: dict[tuple[int, ...], float] = {}
+    rng = np.random.default_rng(1)
+    for simplex in map(tuple, chirotope.bases.tolist()):
+        image = tuple(sorted(half[v] for v in simplex))
+        costs[simplex] = costs.get(image, unit * float(rng.random()))
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": [[simplex, cost] for simplex, cost in costs.items()]}))
+    values = []
+    for chosen in triangulations(chirotope):
+        simplices = {tuple(row) for row in chirotope.bases[list(chosen)].tolist()}
+        if {tuple(sorted(half[v] for v in simplex)) for simplex in simplices} == simplices:
+            values.append(sum(costs[simplex] for simplex in simplices))
+    best = min(values) if sense == "min" else max(values)
+    # The limit only ends what would not come to an end.
+    result = bcut.solve(
+        configuration, objective=f"costs:{file}", sense=sense, invariant_under=[half], time_limit=300
+    )
+    assert (result.status, result.value) == ("optimal", pytest.approx(best, rel=1e-9))
+    assert bcut.verify(result).value == pytest.approx(best, rel=1e-9)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from itertools import combinations, permutations
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,12 @@ from bcut.solving.search import Part, Search
 from bcut.verification import case_split, certificate_reading
 
 Data = dict[str, Any]
+
+
+@pytest.fixture(autouse=True)
+def little_time_for_the_solver(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Whatever it achieves before faces are branched over, every second of it is spent here in vain.
+    monkeypatch.setattr(by_orbits, "_SECONDS_FOR_SMALL", 0.3)
 
 
 def pyritohedron() -> bcut.PointConfiguration:
@@ -204,6 +211,30 @@ def test_many_orbits_are_bounded_by_interior_points(monkeypatch: pytest.MonkeyPa
     inside = branch_over_faces(part_of(stage, target), target, separating=False)
     assert inside.status == branching.status == "refuted"
     assert branch_over_faces(part_of(stage, Fraction(23)), Fraction(23)).status == "found"
+
+
+def test_a_point_of_columns_that_have_been_given_up_is_no_triangulation(tmp_path: Path) -> None:
+    """Just above the target, an exact bound may give up the very columns that the relaxation's point consists of."""
+    near, far, inner, crossing = 5e-12, 8e-12, 5e-12, 7e-12
+    table: list[Any] = []
+    for simplex in combinations(range(6), 3):
+        steps = {(b - a) % 5 for a, b in permutations([v for v in simplex if v < 5], 2)}
+        if simplex[-1] == 5:
+            table.append([simplex, inner if steps == {1, 4} else crossing])
+        else:
+            table.append(
+                [
+                    simplex,
+                    near
+                    if (simplex[1] - simplex[0], simplex[2] - simplex[1]) in ((1, 1), (1, 3), (3, 1))
+                    else far,
+                ]
+            )
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": table}))
+    result = bcut.solve("polygon:5,center", objective=f"costs:{file}", method="orbits")
+    assert (result.status, result.value) == ("optimal", pytest.approx(near + near + far, rel=1e-9))
+    assert bcut.verify(result).value == Fraction(near) + Fraction(near) + Fraction(far)
 
 
 @cache

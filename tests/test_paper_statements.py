@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from reference import integral
 from scipy.spatial import Delaunay
 from test_crossings import meet_badly
 
@@ -57,7 +58,7 @@ def test_simplices_intersect_where_faces_of_complementary_dimensions_do(
     dimension: int, seed: int, pairs: int
 ) -> None:
     configuration = random_points(7, dimension, seed)
-    points = configuration.scalars()
+    points = integral(configuration.scalars())
     answers = []
     for first, second in some_pairs(Chirotope.of(configuration).bases, pairs):
         faces = (
@@ -75,7 +76,7 @@ def test_simplices_intersect_where_faces_of_complementary_dimensions_do(
 @pytest.mark.parametrize("instance", ["grid:3,3", "cube:3", "prism:4", "polygon:6,center"])
 def test_in_degenerate_position_the_dimensions_may_add_up_to_less(instance: str) -> None:
     configuration = load_instance(instance)
-    chirotope, points = Chirotope.of(configuration), configuration.scalars()
+    chirotope, points = Chirotope.of(configuration), integral(configuration.scalars())
     parts = [
         tuple(frozenset(np.flatnonzero(row == sign).tolist()) for sign in (1, -1))
         for row in circuits(chirotope)
@@ -123,7 +124,7 @@ def overlapped(
     missing = next(s for s in range(len(columns)) if s not in {*one, *two})
     # Whatever lies in a simplex has no vertex but its own and inner points; some simplex has another one.
     corners = chirotope.bases[missing].tolist()
-    points = inner.scalars()
+    points = integral(inner.scalars())
     inside = {p for p in range(few) if meet_badly(points, corners, [p]) or p in corners}
     used = next(t for t in one if not set(chirotope.bases[t].tolist()) <= inside)
     return x, columns[missing], columns[used]

@@ -265,3 +265,35 @@ def test_required_simplices_of_dissections() -> None:
     assert formulation.size[0] == len(np.unique(formulation.simplices, axis=0))
     with pytest.raises(InputError, match="can be required of it"):
         bcut.solve("cube:3", dissection=True, require=[(0, 3)])
+
+
+@pytest.mark.parametrize("instance", ["random:7,2,seed=3", "random:6,3,seed=1", "polygon:6"])
+def test_required_faces_of_dissections_in_general_position(instance: str) -> None:
+    """There every dissection is a triangulation, so faces of all dimensions mean what they mean elsewhere."""
+    configuration = load_instance(instance)
+    for size in range(1, configuration.dimension + 1):
+        for face in list(combinations(range(configuration.n), size))[::3]:
+            wanted = bcut.solve(configuration, require=[face], objective="random-costs:1")
+            found = bcut.solve(configuration, require=[face], objective="random-costs:1", dissection=True)
+            assert (found.status, found.value) == (wanted.status, wanted.value), face
+            if found.triangulation is not None:
+                checked = verify(found)
+                assert found.value is not None
+                assert checked.exact_bound is not None
+                assert checked.exact_bound <= found.value
+
+
+def test_faces_of_dissections_say_nothing_to_a_verifier_in_degenerate_position() -> None:
+    """A simplex may cross a required edge of another one there, so no candidate may be left out for it."""
+    for instance, general in (("cube:3", False), ("random:6,3,seed=1", True)):
+        sides = Candidates(ExactPoints(load_instance(instance).scalars()), spanning=False)
+        assert sides.is_general is general
+        candidates = [
+            simplex for simplex in combinations(range(sides.points.n), 4) if sides.orientation(simplex)
+        ]
+        restrictions = RestrictionData(require=((1, 4),), dissection=True)
+        as_triangulation = RestrictionData(require=((1, 4),))
+        admitted = [restrictions.admit(sides, simplex) for simplex in candidates]
+        elsewhere = [as_triangulation.admit(sides, simplex) for simplex in candidates]
+        assert not all(elsewhere)
+        assert admitted == (elsewhere if general else [True] * len(candidates))

@@ -17,7 +17,7 @@ import bcut.instances
 from bcut.bounds import relaxation as relaxation_module
 from bcut.bounds import root as root_module
 from bcut.bounds.relaxation import InfeasibleRelaxationError, Relaxation
-from bcut.bounds.root import RootLimits, Round, root_bound
+from bcut.bounds.root import RootBound, RootLimits, Round, root_bound
 from bcut.errors import SeparatorError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
@@ -320,6 +320,53 @@ def test_malformed_cuts_are_refused_with_the_name_of_the_separator(script: Any, 
     with pytest.raises(SeparatorError, match=f"separator 'mine': .*{message}") as caught:
         root_bound(formulation, objective, at_work(formulation, Scripted(script, "mine")))
     assert caught.value.separator == "mine"
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+@pytest.mark.parametrize("with_target", [False, True])
+def test_what_is_known_at_a_relaxation_is_about_it_alone(seed: int, with_target: bool) -> None:
+    formulation, objective, optimum = with_gap(seed)
+    limits = RootLimits(target=Fraction(optimum) if with_target else None)
+    known: list[RootBound] = []
+    separation = at_work(formulation, HullCuts())
+    found = root_bound(formulation, objective, separation, limits=limits, on_relaxed=known.append)
+    assert len(known) == len(found.rounds) > 2
+    for number, then in enumerate(known):
+        assert then.status == "interrupted"
+        *before, last = then.rounds
+        assert before == found.rounds[:number]
+        assert (last.lp, last.cuts) == (found.rounds[number].lp, {})
+        assert 0 < last.seconds <= found.rounds[number].seconds
+        assert then.point is not None
+        assert len(then.point) == len(then.columns)
+        part, costs = formulation.restricted_to(then.columns), objective.restricted_to(then.columns)
+        assert then.lp_after_cuts == pytest.approx(lp_with_cuts(part, costs, then.cuts), abs=1e-7)
+        assert not then.stages
+    assert (len(found.columns) < len(formulation.simplices)) == with_target
+    assert np.array_equal(known[0].columns, np.arange(len(formulation.simplices)))
+    assert (known[0].lp, known[0].cuts) == (found.lp, [])
+    assert [cut.key for cut in known[-1].cuts] == [cut.key for cut in found.cuts]
+
+
+@pytest.mark.parametrize("calls", [1, 3])
+def test_an_interrupted_separator_leaves_what_is_known(calls: int) -> None:
+    formulation, objective, _ = with_gap(2)
+    cuts = HullCuts()
+    cuts.setup(at_work(formulation, Watching()).problem)
+    known: list[RootBound] = []
+
+    def press(point: Any) -> list[Cut]:
+        if len(known) == calls:
+            raise KeyboardInterrupt
+        return list(cuts.separate(point))
+
+    with pytest.raises(KeyboardInterrupt):
+        root_bound(formulation, objective, at_work(formulation, Scripted(press)), on_relaxed=known.append)
+    assert len(known) == calls
+    assert known[-1].status == "interrupted"
+    assert known[-1].lp_after_cuts == pytest.approx(
+        lp_with_cuts(formulation, objective, known[-1].cuts), abs=1e-7
+    )
 
 
 def test_an_interrupt_stops_a_relaxation_in_the_middle() -> None:

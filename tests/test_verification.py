@@ -292,6 +292,7 @@ class Judge:
         self.dimension = len(points[0])
         configuration = PointConfiguration.from_values(np.array(points))
         subsets = combinations(range(len(points)), self.dimension + 1)
+        self.volumes: dict[tuple[int, ...], int] = {}
         self.full = [simplex for simplex in subsets if self.volume(simplex)]
         crossing = crossing_matrix(Chirotope.of(configuration), np.array(self.full))
         self.crossing = {
@@ -301,8 +302,13 @@ class Judge:
         self.hull = round(ConvexHull(np.array(points)).volume * [1, 1, 2, 6][self.dimension])
 
     def volume(self, simplex: Sequence[int]) -> int:
-        first, *rest = (self.points[v] for v in simplex)
-        return abs(determinant([[a - b for a, b in zip(point, first, strict=True)] for point in rest]))
+        key = tuple(simplex)
+        if key not in self.volumes:
+            first, *rest = (self.points[v] for v in key)
+            self.volumes[key] = abs(
+                determinant([[a - b for a, b in zip(point, first, strict=True)] for point in rest])
+            )
+        return self.volumes[key]
 
     def is_triangulation(self, simplices: Sequence[tuple[int, ...]]) -> bool:
         if any(not self.volume(simplex) for simplex in simplices) or len(set(simplices)) != len(simplices):

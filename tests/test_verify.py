@@ -239,6 +239,41 @@ def test_the_largest_cost_is_not_looked_for_where_sets_are_too_many() -> None:
     assert verify(tiny_grid(0, costs=[[[0, 1, 2], 1]]), max_subsets=1).value == Fraction(4, 10**12)
 
 
+def test_integers_as_large_as_what_solvers_tell_apart() -> None:
+    """Costs of 10^15 with bounds from floating-point solvers: optimal within the relative gap of other large values."""
+    costs = {"default": 10**15 + 1, "costs": []}
+    value = 5 * (10**15 + 1)
+    changes: dict[str, Any] = {
+        "problem__objective": "costs:gone.json",
+        "problem__costs": costs,
+        "value": value,
+    }
+    for bound in (value, value - 5, value - 10**6):
+        checked = verify(result_of(CUBE, CUBE_5, bound=bound, gap=(value - bound) / value, **changes))
+        assert (checked.value, checked.proven_optimal) == (value, False)
+        assert "optimality rests on the run itself" in checked.statement
+    with pytest.raises(VerificationError, match="leaves room"):
+        verify(result_of(CUBE, CUBE_5, bound=value - 10**7, gap=10**7 / value, **changes))
+
+
+def test_solve_and_verify_agree_on_large_integers(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    simplices = [list(simplex) for simplex in combinations(range(8), 3)]
+    table = [
+        [simplex, int(cost)]
+        for simplex, cost in zip(
+            simplices, 10**15 * rng.integers(1, 9, 56) + rng.integers(0, 4, 56), strict=True
+        )
+    ]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": table}))
+    for seed in range(8):
+        for sense in ("min", "max"):
+            result = bcut.solve(f"random:8,2,seed={seed}", objective=f"costs:{file}", sense=sense)
+            assert result.status == "optimal"
+            assert verify(result).value == result.value
+
+
 @pytest.mark.parametrize("bound", [3.99999999999e-12, "3999999999/1000000000000000000000"])
 def test_what_solvers_leave_open_is_relative_to_small_values_too(bound: Any) -> None:
     assert "optimality rests on the run itself" in verify(tiny_grid(bound)).statement

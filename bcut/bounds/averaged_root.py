@@ -141,6 +141,8 @@ class _Loop:
             assert root.point is not None
             assert root.lp is not None
             kept = self.give_up(bound, _SHRINK)
+            if kept is not None and np.delete(root.point, kept).max() > _INTEGRAL:
+                continue  # next to the target, what is given up may be in the point
             x = self.part.spread(root.point if kept is None else root.point[kept])
             if np.minimum(x, np.abs(1 - x)).max(initial=0.0) <= _INTEGRAL:
                 return self.ended("integral", x, bound.value)

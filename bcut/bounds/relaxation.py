@@ -23,6 +23,8 @@ from bcut.separation.driver import IntegerCut
 # is faster again.
 _INTERIOR_POINT_FROM = 1500
 _SIMPLEX_ITERATIONS = 0.4
+# Up to this many columns HiGHS takes milliseconds, less than a thread to interrupt it from and its callbacks would.
+_AT_ONCE = 1000
 # Rows of the formulation that are left to be asked for count as violated from this much on.
 _LAZY_TOLERANCE = 1e-6
 
@@ -208,7 +210,10 @@ class Relaxation:
                 return highspy.HighsModelStatus.kTimeLimit
             solver.setOptionValue("time_limit", solver.getRunTime() + remaining)
         solver.setOptionValue("solver", "ipm" if self._interior_point else "simplex")
-        _run_interruptibly(solver)
+        if len(self._costs) <= _AT_ONCE:
+            solver.run()
+        else:
+            _run_interruptibly(solver)
         return solver.getModelStatus()
 
     def safe_bound(self, duals: NDArray[np.float64]) -> SafeBound:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -87,9 +87,10 @@ class RootBound:
 
     Attributes
     ----------
-    status : {"integral", "dry", "stalled", "limit", "target", "infeasible"}
+    status : {"integral", "dry", "stalled", "limit", "target", "infeasible", "interrupted"}
         Why it ended: an integral point, no more violated cuts, no progress, a limit, a bound beyond the
-        target, or no point at all.
+        target, or no point at all. "interrupted" stands for what is known at a relaxation while the loop goes on, and
+        remains should anything interrupt it.
     lp, lp_after_cuts : float or None
         LP values before and after cuts, unrounded; None where none was found in time.
     rounds : list of Round
@@ -111,7 +112,7 @@ class RootBound:
     columns: NDArray[np.intp]
     separation: Separation | None = None
 
-    status: Literal["integral", "dry", "stalled", "limit", "target", "infeasible"] = "limit"
+    status: Literal["integral", "dry", "stalled", "limit", "target", "infeasible", "interrupted"] = "limit"
     lp: float | None = None
     lp_after_cuts: float | None = None
     rounds: list[Round] = field(default_factory=list)
@@ -160,7 +161,7 @@ class _Loop:
         if point is None:
             self.result.status = "limit"
             return False
-        self._record(point)
+        self._record(point, started)
         cuts = self._separate(point)
         counts: dict[str, int] = {}
         for cut in cuts:
@@ -182,7 +183,7 @@ class _Loop:
                 return point
             self.relaxation.add(rows)
 
-    def _record(self, point: RelaxationPoint) -> None:
+    def _record(self, point: RelaxationPoint, started: float) -> None:
         result = self.result
         previous = result.lp_after_cuts
         result.point, result.lp_after_cuts = point.x, point.value
@@ -195,10 +196,21 @@ class _Loop:
             result.last = bound
             self.best = Stage(self.relaxation.formulation, bound, tuple(self.relaxation.cuts))
         if self.on_relaxed is not None:
-            self.on_relaxed(result)
+            self.on_relaxed(self._known(Round(point.value, {}, time.perf_counter() - started)))
         size = self.relaxation.objective.largest_cost
         moved = previous is None or abs(point.value - previous) > self.limits.stall * max(size, abs(previous))
         self.stalled = 0 if moved else self.stalled + 1
+
+    def _known(self, last: Round) -> RootBound:
+        """Return what is known at a relaxation, apart from what the loop goes on to change."""
+        result = self.result
+        return replace(
+            result,
+            status="interrupted",
+            rounds=[*result.rounds, last],
+            cuts=list(self.relaxation.cuts),
+            stages=[],
+        )
 
     def _separate(self, point: RelaxationPoint) -> list[IntegerCut]:
         """Return new cuts; none when the loop should end, with the reason in the result's status."""
@@ -300,12 +312,20 @@ def root_bound(
     on_round : callable, optional
         Told of every finished round.
     on_relaxed : callable, optional
-        Told of what is known when a relaxation is solved, before it is separated: separators may take long, or fail.
+        Handed what is known when a relaxation is solved, before it is separated: separators may take long, fail, or
+        be interrupted. It is about this relaxation, with its cuts, and what follows does not change it: whoever keeps
+        the last one has what is to be had when the loop is ended from outside.
     cuts : sequence of IntegerCut
         Known already: they are in the relaxation from the start.
 
     Returns
     -------
     RootBound
+        Never "interrupted".
+
+    Raises
+    ------
+    KeyboardInterrupt
+        After Ctrl-C, or at a limit on the whole process: see `on_relaxed`.
     """
     return _Loop(formulation, objective, separation, limits or RootLimits(), on_round, on_relaxed, cuts).run()

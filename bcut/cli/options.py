@@ -38,7 +38,10 @@ def _faces(
 
 instance_argument = click.argument("instance")
 
-objective_options = _together(
+result_argument = click.argument("result", type=click.Path(path_type=Path))
+
+problem_options = _together(
+    instance_argument,
     click.option(
         "--objective",
         default="cardinality",
@@ -64,7 +67,8 @@ objective_options = _together(
     click.option(
         "--dissection",
         is_flag=True,
-        help="Allow simplices that do not meet face to face, as long as they do not overlap.",
+        help="Allow simplices that do not meet face to face, as long as they do not overlap; with --spanning, only "
+        "simplices without further points in them.",
     ),
     click.option(
         "--require",
@@ -101,36 +105,30 @@ separator_options = _together(
     click.option("--no-separators", is_flag=True, help="Put no cut family to work."),
 )
 
-symmetry_options = _together(
-    click.option(
-        "--symmetries",
-        metavar="FILE",
-        help="Work over the orbits of these symmetries instead of all: a file of permutations, [[1,0,2,3],...], or a "
-        "TOPCOM file with generators behind its points. They are checked exactly.",
-    ),
+symmetries_option = click.option(
+    "--symmetries",
+    metavar="FILE",
+    help="Work over the orbits of these symmetries instead of all: a file of permutations, [[1,0,2,3],...], or a "
+    "TOPCOM file with generators behind its points. They are checked exactly.",
 )
 
-run_options = _together(
-    click.option(
-        "--time-limit",
-        type=float,
-        metavar="S",
-        help="Stop after S seconds with what was found (exit status 3).",
-    ),
-    click.option(
-        "--memory-limit",
-        type=float,
-        metavar="GIB",
-        help="Stop when the process uses more than this, with what was found (exit status 3).",
-    ),
-    click.option(
-        "--seed",
-        type=int,
-        default=0,
+
+def method_option(**explained: str) -> Decorator[Any]:
+    """Return the option for the way to work on an instance: the names of the methods, "auto" among them, explained."""
+    return click.option(
+        "--method",
+        type=click.Choice(sorted(explained, key=lambda name: name != "auto")),
+        default="auto",
         show_default=True,
-        metavar="N",
-        help="Seed of the solver's random choices.",
-    ),
+        help=" ".join(f"{name}: {text}." for name, text in explained.items()),
+    )
+
+
+time_limit_option = click.option(
+    "--time-limit",
+    type=float,
+    metavar="S",
+    help="Stop after S seconds with what was found (exit status 3).",
 )
 
 json_option = click.option(
@@ -150,4 +148,23 @@ report_options = _together(
         is_flag=True,
         help="No summary and no progress: only the data that --json or --output asks for.",
     ),
+)
+
+run_options = _together(
+    time_limit_option,
+    click.option(
+        "--memory-limit",
+        type=float,
+        metavar="GIB",
+        help="Stop when the process uses more than this, with what was found (exit status 3).",
+    ),
+    click.option(
+        "--seed",
+        type=int,
+        default=0,
+        show_default=True,
+        metavar="N",
+        help="Seed of the solver's random choices.",
+    ),
+    report_options,
 )

@@ -58,7 +58,7 @@ def carry_out(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes | None]:
         "instance": {**instance, "points": len(task["instance"]["points"])},
         "problem": task["problem"],
         "settings": task["settings"],
-        "outcome": outcome,
+        "outcome": outcome.stored(task["settings"]["preset"]),
         "cuts": counts,
         **run.measured(),
         "code": task["code"],

@@ -1,13 +1,11 @@
-"""What is known of a root while it is worked on, for runs whose time limit comes in the midst of separating."""
+"""What is known of SCIP's root while it is worked on, for runs whose time limit comes in the midst of separating."""
 
 from __future__ import annotations
 
 import signal
 import threading
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from math import isclose
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -15,46 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bcut.experiments.recording import SCIP_ROOT, CutKey, Recorder
+from bcut.experiments.recording import SCIP_ROOT, Recorder
 from bcut.separation.driver import Separation
 from bcut.solving.memory import Watch
 
 if TYPE_CHECKING:
-    from bcut.bounds.root import RootBound
     from bcut.separation.driver import IntegerCut
     from bcut.separation.seam import Problem
-
-
-@dataclass
-class KnownLoop:
-    """What the last relaxation of a cutting-plane loop has shown.
-
-    Attributes
-    ----------
-    root : RootBound or None
-        As the loop would return it if it stopped there, but for its cuts.
-    keys : set
-        Of the cuts in that relaxation, over ``root.columns``.
-    seconds : float
-        That relaxations had taken until then, with what recording took.
-    """
-
-    root: RootBound | None = None
-    keys: frozenset[CutKey] = frozenset()
-    seconds: float = 0.0
-    started: float = 0.0
-
-    def relaxed(self, found: RootBound) -> None:
-        """Note a relaxation; `bcut.bounds.root.root_bound` tells of it before it is separated."""
-        from bcut.bounds.root import Round
-
-        assert found.separation is not None
-        assert found.lp_after_cuts is not None
-        spent = sum(family.seconds for family in found.separation.statistics.values())
-        self.keys = frozenset(found.separation.known)
-        self.seconds = time.perf_counter() - self.started - spent
-        # Last, so that what belongs to it has been noted.
-        self.root = replace(found, status="limit", rounds=[*found.rounds, Round(found.lp_after_cuts, {})])
 
 
 class RootWatcher:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +72,8 @@ def measured_at(
 
 def delaunay(
     configuration: PointConfiguration, objective: str, sense: str
-) -> tuple[list[list[int]], dict[str, Any]]:
-    """Return the Delaunay triangulation, and the outcome of a run that takes it, without its seconds.
+) -> tuple[list[list[int]], int | float]:
+    """Return the Delaunay triangulation, and the value of an objective there.
 
     Raises
     ------
@@ -82,22 +81,4 @@ def delaunay(
         As `delaunay_triangulation`, and for an objective that these points do not have.
     """
     found = delaunay_triangulation(configuration)
-    unknown = (
-        "lp",
-        "lp_after_cuts",
-        "integral",
-        "bound",
-        "columns",
-        "rows",
-        "nonzeros",
-        "columns_after_fixing",
-    )
-    outcome: dict[str, Any] = {
-        "status": "verified",
-        **dict.fromkeys(unknown),
-        "value": value_at(configuration, found, objective, sense),
-        "nodes": 0,
-        "rounds": [],
-        "separators": {},
-    }
-    return found, outcome
+    return found, value_at(configuration, found, objective, sense)

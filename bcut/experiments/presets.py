@@ -9,17 +9,21 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from fractions import Fraction
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from bcut.errors import InputError
-from bcut.experiments.interruption import KnownLoop, RootWatcher
+from bcut.experiments.interruption import RootWatcher
 from bcut.experiments.ledger import LedgerWriter
 from bcut.experiments.measuring import delaunay, measured_at
+from bcut.experiments.outcome import RunOutcome
 from bcut.experiments.recording import Recorder
 from bcut.experiments.scip_names import DEFAULT, named
 from bcut.solving.memory import Watch, watched
+
+if TYPE_CHECKING:
+    from bcut.bounds.root import RootBound
 
 Found = TypeVar("Found")
 
@@ -55,68 +59,60 @@ class Run:
         self.deadline = None if limit is None else time.monotonic() + limit
         self.formulation: Any = None
         self.separation: Any = None
+        self.bounded: RootBound | None = None
+        self.solving = 0.0
         self.watch = Watch()
 
-    def outcome(self) -> dict[str, Any]:
-        """Do what the preset asks for; returns what came out, as plain data.
-
-        In it, ``integral`` says whether the root settled the problem, as the preset can tell. Our loop, and ``bcut
-        solve``: the point of the last relaxation at the root is a triangulation. SCIP's root: SCIP proved optimality
-        there, which it may do by rounding its bound, while the last relaxation's point is still fractional. None
-        where the root is not looked at.
-        """
+    def outcome(self) -> RunOutcome:
+        """Do what the preset asks for."""
         presets = {
             "loop": self.loop, "root": self.root, "solve": self.solve, "plain": self.plain, "sizes": self.sizes,
             "delaunay": self.delaunay,
         }  # fmt: skip
-        return presets[self.settings["preset"]]()
+        outcome = presets[self.settings["preset"]]()
+        if self.formulation is not None:
+            matrix = self.formulation.matrix
+            outcome.columns = len(self.formulation.simplices)
+            outcome.rows, outcome.nonzeros = matrix.shape[0], int(matrix.nnz)
+        return outcome
 
-    def loop(self) -> dict[str, Any]:
+    def loop(self) -> RunOutcome:
         """Run the cutting-plane loop in HiGHS."""
         from bcut.bounds.root import RootBound, RootLimits, root_bound
 
         if self.settings["method"] != "listing":
             return self._by_bound()
-        known = KnownLoop()
 
-        def work() -> Any:
+        def keep(found: RootBound) -> None:
+            spent = sum(finished.seconds for finished in found.rounds)
+            self.bounded, self.solving = found, spent - _separating(self._families())
+
+        def work() -> None:
             objective = self._begin()
             target = None
             if self.problem["cutoff"] is not None:
                 target = objective.sign * Fraction(self.problem["cutoff"])
             limits = RootLimits(deadline=self.deadline, target=target)
-            known.started = time.perf_counter()
-            return root_bound(
-                self.formulation, objective, self.separation, limits=limits, on_relaxed=known.relaxed
-            )
+            keep(root_bound(self.formulation, objective, self.separation, limits=limits, on_relaxed=keep))
 
-        ended = self._within_limit(work)
+        self._within_limit(work)
+        written = self.formulation is not None
+        found = self.bounded or RootBound(np.arange(len(self.formulation.simplices) if written else 0))
         own = self._families()
-        found: RootBound
-        if ended is not None:
-            found, among = ended, None
-            spent = sum(finished.seconds for finished in found.rounds)
-            spent -= sum(entry["seconds"] for entry in own.values())
-        else:
-            nothing = RootBound(np.arange(self._size()["columns"] or 0))
-            found, among, spent = known.root or nothing, known.keys, known.seconds
-        self._finish_ledger(lambda recorder: recorder.finish_loop(found, among))
-        return {
-            "status": found.status,
-            "lp": found.lp,
-            "lp_after_cuts": found.lp_after_cuts,
-            "integral": found.status == "integral",
-            "value": None,
-            "bound": found.lp_after_cuts,
-            "nodes": 0,
-            "rounds": [[finished.lp, finished.cuts] for finished in found.rounds],
-            **self._size(),
-            "columns_after_fixing": None if self.formulation is None else len(found.columns),
-            "separators": own,
-            "seconds": self._seconds(lp=spent - self._recording, own=own),
-        }
+        self._finish_ledger(lambda recorder: recorder.finish_loop(found))
+        return RunOutcome(
+            status="limit" if found.status == "interrupted" else found.status,
+            lp=found.lp,
+            lp_after_cuts=found.lp_after_cuts,
+            integral=found.status == "integral",
+            bound=found.lp_after_cuts,
+            rounds=[(finished.lp, finished.cuts) for finished in found.rounds],
+            columns_after_fixing=len(found.columns) if written else None,
+            separators=own,
+            seconds=self._seconds(lp=self.solving - self._recording, own=own),
+        )
 
-    def root(self) -> dict[str, Any]:
+    def root(self) -> RunOutcome:
         """Run SCIP's root node under clean conditions."""
         from bcut.scip.host import TreeOptions, branch_and_cut
 
@@ -149,10 +145,12 @@ class Run:
         if found is None:
             return self._unfinished(watcher)
         tree, objective = found
-        # By its point, or by rounding: see `outcome`. The point itself is not at hand.
-        return {"integral": tree.status == "optimal", **self._of_tree(tree, objective, self._families())}
+        outcome = self._of_tree(tree, objective, self._families())
+        # By its point, or by rounding: see `RunOutcome`. The point itself is not at hand.
+        outcome.integral = tree.status == "optimal"
+        return outcome
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> RunOutcome:
         """Leave the exported model to SCIP and its defaults."""
         from bcut.scip.host import TreeOptions, branch_and_cut
 
@@ -167,9 +165,9 @@ class Run:
         if found is None:
             return self._unfinished(RootWatcher(self.watch))
         tree, objective = found
-        return {"integral": None, **self._of_tree(tree, objective, {})}
+        return self._of_tree(tree, objective, {})
 
-    def solve(self) -> dict[str, Any]:
+    def solve(self) -> RunOutcome:
         """Solve as ``bcut solve`` does."""
         from bcut.solving.api import solve
 
@@ -191,12 +189,12 @@ class Run:
         self.triangulation = result.triangulation
         return self._of_result(result)
 
-    def delaunay(self) -> dict[str, Any]:
+    def delaunay(self) -> RunOutcome:
         """Take the Delaunay triangulation, which has a value and no bound."""
-        self.triangulation, found = delaunay(
+        self.triangulation, value = delaunay(
             self.configuration, self.problem["objective"], self.problem["sense"]
         )
-        return {**found, "seconds": self._seconds(lp=0.0, own={})}
+        return RunOutcome(status="verified", value=value, seconds=self._seconds())
 
     def measured(self) -> dict[str, Any]:
         """Return the triangulation and its measures, where measures are asked for."""
@@ -206,14 +204,29 @@ class Run:
         values = {} if found is None else measured_at(self.configuration, found, wanted)
         return {"triangulation": found, "measures": values}
 
-    def sizes(self) -> dict[str, Any]:
+    def sizes(self) -> RunOutcome:
         """Count columns, rows and nonzeros, and solve nothing."""
-        from bcut.experiments.sizes import count
+        from bcut.experiments.sizes import full_size
 
-        counted = count(self._formulation_name(), self.configuration, self.problem["spanning"], self.deadline)
-        return {**counted, "seconds": self._seconds(lp=0.0, own={})}
+        found = full_size(
+            self._formulation_name(),
+            self.configuration,
+            spanning=self.problem["spanning"],
+            deadline=self.deadline,
+        )
+        seconds = self._seconds()
+        if found is None:
+            return RunOutcome(status="limit", seconds=seconds)
+        return RunOutcome(
+            status="counted",
+            columns=found.columns,
+            rows=found.rows,
+            nonzeros=found.nonzeros,
+            kinds=found.kinds,
+            seconds=seconds,
+        )
 
-    def _by_bound(self) -> dict[str, Any]:
+    def _by_bound(self) -> RunOutcome:
         """Run the loop over orbits, or over the columns that multipliers leave."""
         from bcut.solving.api import bound
 
@@ -254,24 +267,21 @@ class Run:
         if self.recorder is not None and not self.recorder.torn:
             self.ledger = finish(self.recorder)
 
-    def _unfinished(self, watcher: RootWatcher) -> dict[str, Any]:
+    def _unfinished(self, watcher: RootWatcher) -> RunOutcome:
         """Return what is known of SCIP's root where SCIP could not be heard."""
         lps = [lp for lp, _ in watcher.rounds]
         own = self._families()
-        return {
-            "integral": False if self.settings["preset"] == "root" else None,
-            "status": "limit",
-            "lp": lps[0] if lps else None,
-            "lp_after_cuts": lps[-1] if lps else None,
-            "value": None,
-            "bound": lps[-1] if lps else None,
-            "nodes": 1 if lps else 0,
-            "rounds": [[lp, cuts] for lp, cuts in watcher.rounds],
-            **self._size(),
-            "columns_after_fixing": None,
-            "separators": own,
-            "seconds": self._seconds(lp=0.0, own=own),
-        }
+        return RunOutcome(
+            status="limit",
+            lp=lps[0] if lps else None,
+            lp_after_cuts=lps[-1] if lps else None,
+            integral=False if self.settings["preset"] == "root" else None,
+            bound=lps[-1] if lps else None,
+            nodes=1 if lps else 0,
+            rounds=list(watcher.rounds),
+            separators=own,
+            seconds=self._seconds(own=own),
+        )
 
     def _program(self) -> tuple[Any, Any]:
         from bcut.objectives.objective import Bottleneck, make_objective
@@ -291,16 +301,6 @@ class Run:
         from bcut.solving.programs import formulation_name
 
         return formulation_name(self.problem["formulation"], dissection=False)
-
-    def _size(self) -> dict[str, int | None]:
-        """Return the size of the program as it was written: without rows that are added where they are violated."""
-        if self.formulation is None:
-            return {"columns": None, "rows": None, "nonzeros": None}
-        return {
-            "columns": len(self.formulation.simplices),
-            "rows": self.formulation.matrix.shape[0],
-            "nonzeros": int(self.formulation.matrix.nnz),
-        }
 
     def _record(self, formulation: Any) -> None:
         # In other formulations cuts may speak of more than d-simplices.
@@ -339,7 +339,11 @@ class Run:
         return 0.0 if self.recorder is None else self.recorder.seconds
 
     def _seconds(
-        self, *, lp: float, own: Mapping[str, Any], aside: tuple[float, float] = (0.0, 0.0)
+        self,
+        *,
+        lp: float = 0.0,
+        own: Mapping[str, Any] | None = None,
+        aside: tuple[float, float] = (0.0, 0.0),
     ) -> dict[str, float]:
         # Recording is no part of the run, nor is what was set aside, as wall and as processor time.
         recording = 0.0 if self.recorder is None else self.recorder.processor
@@ -347,50 +351,35 @@ class Run:
             "total": max(0.0, time.perf_counter() - self.started - self._recording - aside[0]),
             "processor": max(0.0, time.process_time() - self.processor - recording - aside[1]),
             "lp": max(0.0, lp),
-            "separation": sum(entry["seconds"] for entry in own.values()),
+            "separation": _separating(own or {}),
         }
 
-    def _of_tree(self, tree: Any, objective: Any, own: dict[str, Any]) -> dict[str, Any]:
+    def _of_tree(self, tree: Any, objective: Any, own: dict[str, Any]) -> RunOutcome:
         assert tree.solver is not None
         if tree.columns is not None:
             self.triangulation = self.formulation.simplices[sorted(tree.columns)].tolist()
         theirs = {f"scip:{name}": asdict(entry) for name, entry in tree.solver.separators.items()}
+        every = {**own, **theirs}
         lps = [finished.lp for finished in tree.rounds]
-        return {
-            "status": "limit" if self.watch.reached and tree.status == "interrupted" else tree.status,
-            "lp": lps[0] if lps else None,
-            "lp_after_cuts": lps[-1] if lps else None,
-            "value": None if tree.columns is None else float(objective.value(tree.columns)),
-            "bound": tree.bound,
-            "nodes": tree.nodes,
-            "rounds": [[finished.lp, finished.cuts] for finished in tree.rounds],
-            **self._size(),
-            "columns_after_fixing": None,
-            "separators": {**own, **theirs},
-            "seconds": self._seconds(
-                lp=tree.solver.lp_seconds,
-                own={**own, **theirs},
-                aside=(tree.watching, tree.watching_processor),
+        return RunOutcome(
+            status="limit" if self.watch.reached and tree.status == "interrupted" else tree.status,
+            lp=lps[0] if lps else None,
+            lp_after_cuts=lps[-1] if lps else None,
+            value=None if tree.columns is None else float(objective.value(tree.columns)),
+            bound=tree.bound,
+            nodes=tree.nodes,
+            rounds=[(finished.lp, finished.cuts) for finished in tree.rounds],
+            separators=every,
+            seconds=self._seconds(
+                lp=tree.solver.lp_seconds, own=every, aside=(tree.watching, tree.watching_processor)
             ),
-        }
+        )
 
-    def _of_result(self, result: Any) -> dict[str, Any]:
+    def _of_result(self, result: Any) -> RunOutcome:
         own = result.separators
-        in_root = result.seconds.get("root", 0.0)
-        return {
-            "status": result.status,
-            "lp": result.root.lp,
-            "lp_after_cuts": result.root.lp_after_cuts,
-            "integral": result.root.integral,
-            "value": result.value,
-            "bound": result.bound,
-            "nodes": result.nodes,
-            "rounds": [[entry.lp, entry.cuts] for entry in result.root.rounds],
-            "columns": result.size.columns,
-            "rows": result.size.rows,
-            "nonzeros": None,
-            "columns_after_fixing": result.size.columns_after_fixing,
-            "separators": own,
-            "seconds": self._seconds(lp=in_root - sum(entry["seconds"] for entry in own.values()), own=own),
-            "stages": result.seconds,
-        }
+        lp = result.seconds.get("root", 0.0) - _separating(own)
+        return RunOutcome.of_result(result, self._seconds(lp=lp, own=own))
+
+
+def _separating(families: Mapping[str, Any]) -> float:
+    return sum(entry["seconds"] for entry in families.values())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -27,7 +27,6 @@ _TIGHT = 1e-6
 SCIP_ROOT = 1
 
 Inequality = tuple[bytes, bytes, float]
-CutKey = tuple[bytes, bytes, int]
 
 
 @dataclass
@@ -150,22 +149,14 @@ class Recorder:
 
     # The end.
 
-    def finish_loop(self, bound: RootBound, among: Container[CutKey] | None = None) -> bytes:
-        """Write the last relaxation of a root bound; returns the file.
-
-        Parameters
-        ----------
-        bound : RootBound
-        among : container, optional
-            Keys of the cuts in the relaxation, where the bound does not tell its cuts. Those from before columns were
-            fixed may be missing among them.
-        """
+    def finish_loop(self, bound: RootBound) -> bytes:
+        """Write the last relaxation of a root bound; returns the file."""
         assert self.whole is not None
         kept, lp = bound.columns, bound.lp_after_cuts
         # Where a limit came before the cuts of the last round were solved with, the value is that without them; and
-        # unknown where columns were fixed meanwhile.
+        # unknown where columns were fixed meanwhile. An interrupted loop tells of the relaxation before.
         unsolved = {opened.entry["number"] for opened in self._open}
-        if (unsolved or among is not None) and len(kept) < len(self.whole.simplices):
+        if unsolved and bound.status != "interrupted" and len(kept) < len(self.whole.simplices):
             lp = None
         fixed = np.setdiff1d(np.arange(len(self.whole.simplices)), kept)
         place = np.full(len(self.whole.simplices), -1)
@@ -178,7 +169,7 @@ class Recorder:
                 _key(place[opened.columns][stays], opened.coefficients[stays], float(opened.entry["rhs"]))
             ] = number
         final: list[int] = []
-        for cut in bound.cuts if among is None else self._taken_among(among, place):
+        for cut in bound.cuts:
             found = taken.get(_key(cut.columns, cut.coefficients.astype(float), float(cut.rhs)))
             if found is None:
                 # A row of a formulation whose rows are written when they are needed.
@@ -189,21 +180,6 @@ class Recorder:
             active = bound.point is not None and cut.violation(bound.point) >= -_TIGHT
             self._count_final(cut.family, active=active)
         return self._finish(lp, final, fixed, np.array([], dtype=int))
-
-    def _taken_among(self, keys: Container[CutKey], place: NDArray[np.integer]) -> Iterator[IntegerCut]:
-        """Yield the cuts with certain keys that the solver took; `place` is where columns of the whole are now."""
-        from bcut.separation.driver import IntegerCut
-
-        for _, opened in self._taken:
-            assert opened.columns is not None
-            columns = place[opened.columns]
-            stays = columns >= 0
-            coefficients = opened.coefficients[stays].astype(np.int64)
-            cut = IntegerCut(
-                opened.entry["family"], columns[stays].astype(np.int64), coefficients, opened.entry["rhs"], {}
-            )
-            if cut.key in keys:
-                yield cut
 
     def finish_scip(self) -> bytes:
         """Write the last relaxation of SCIP's root; returns the file."""

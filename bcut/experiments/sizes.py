@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,25 +42,6 @@ class FullSize:
     def rows(self) -> int:
         """Number of rows of all kinds."""
         return sum(self.kinds.values())
-
-
-def count(
-    name: str, configuration: PointConfiguration, spanning: bool, deadline: float | None
-) -> dict[str, Any]:
-    """Return the outcome of a run that counts, without its seconds: that of one that solves, as far as it goes."""
-    found = full_size(name, configuration, spanning=spanning, deadline=deadline)
-    unknown = ("lp", "lp_after_cuts", "integral", "value", "bound", "columns_after_fixing")
-    size = dict.fromkeys(("columns", "rows", "nonzeros", "kinds"))
-    if found is not None:
-        size |= {"rows": found.rows, **asdict(found)}
-    return {
-        "status": "limit" if found is None else "counted",
-        **dict.fromkeys(unknown),
-        "nodes": 0,
-        "rounds": [],
-        "separators": {},
-        **size,
-    }
 
 
 def full_size(

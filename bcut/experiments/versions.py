@@ -16,8 +16,8 @@ from bcut.errors import InputError
 # Parts of the package that no result depends on; of the experiments, these do the work of a run.
 _ASIDE = ("cli", "plotting", "experiments")
 _AT_WORK = (
-    "__init__.py", "execute.py", "interruption.py", "ledger.py", "measuring.py", "presets.py", "process.py",
-    "recording.py", "scip_names.py", "sizes.py", "versions.py",
+    "__init__.py", "execute.py", "interruption.py", "ledger.py", "measuring.py", "outcome.py", "presets.py",
+    "process.py", "recording.py", "scip_names.py", "sizes.py", "versions.py",
 )  # fmt: skip
 # By the names that records have for them.
 _LIBRARIES = {

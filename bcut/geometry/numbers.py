@@ -35,17 +35,18 @@ class AlgebraicNumber:
     Attributes
     ----------
     field : RealField
-    coefficients : tuple of Fraction
-        The number is sum_k coefficients[k] * basis_k.
+    coefficients : tuple of int or Fraction
+        The number is sum_k coefficients[k] * basis_k. Products of the basis have integer coefficients, so that
+        sums and products of numbers with integers here have integers again, without the cost of fractions.
     """
 
     field: RealField
-    coefficients: tuple[Fraction, ...]
+    coefficients: tuple[int | Fraction, ...]
 
     @classmethod
     def of(cls, field: RealField, rational: Fraction | int) -> AlgebraicNumber:
         """Return a rational number as an element of the field."""
-        return cls(field, (Fraction(rational), *[Fraction(0)] * (field.degree - 1)))
+        return cls(field, (rational, *[0] * (field.degree - 1)))
 
     def is_rational(self) -> bool:
         """Whether the number is rational; then it equals its first coefficient."""
@@ -73,10 +74,10 @@ class AlgebraicNumber:
             The number is zero.
         """
         if self.is_rational():
-            return AlgebraicNumber.of(self.field, 1 / self.coefficients[0])
+            return AlgebraicNumber.of(self.field, 1 / Fraction(self.coefficients[0]))
         if self.field.degree == 2:
             a, b = self.coefficients
-            norm = a * a - self.field.radicands[1] * b * b  # not zero: the radicand is no square
+            norm = Fraction(a * a - self.field.radicands[1] * b * b)  # not zero: the radicand is no square
             return AlgebraicNumber(self.field, (a / norm, -b / norm))
         import flint
 
@@ -92,7 +93,7 @@ class AlgebraicNumber:
 
     def _coerce(self, other: object) -> AlgebraicNumber | None:
         if isinstance(other, AlgebraicNumber):
-            if other.field != self.field:
+            if other.field is not self.field and other.field != self.field:
                 raise ValueError("numbers of different fields; bring them into one with unify()")
             return other
         return AlgebraicNumber.of(self.field, other) if isinstance(other, int | Fraction) else None
@@ -120,11 +121,14 @@ class AlgebraicNumber:
         right = self._coerce(other)
         if right is None:
             return NotImplemented
-        total = [Fraction(0)] * self.field.degree
+        total: list[int | Fraction] = [0] * self.field.degree
+        products = self.field.products
         for i, a in enumerate(self.coefficients):
+            if not a:
+                continue
             for j, b in enumerate(right.coefficients):
-                if a and b:
-                    for k, constant in self.field.products[i, j]:
+                if b:
+                    for k, constant in products[i, j]:
                         total[k] += a * b * constant
         return AlgebraicNumber(self.field, tuple(total))
 
@@ -211,7 +215,7 @@ def unify(
     if all(isinstance(value, Fraction) for value in values):
         return RATIONALS, [(value,) for value in values if isinstance(value, Fraction)]
     field = field_for(term for value in values for term in _terms(value))
-    rows = [_in_field(value, field).coefficients for value in values]
+    rows = [tuple(map(Fraction, _in_field(value, field).coefficients)) for value in values]
     while True:  # each step needs a smaller field; a text that is read back must find the last one
         used = [any(row[k] for row in rows) for k in range(field.degree)]
         basis = field.basis_terms()

@@ -92,7 +92,7 @@ class Restrictions:
         simplices : ndarray of int64, shape (m, d + 1)
         dissection : bool
             Required simplices then exclude those that they overlap; required faces of smaller dimensions mean nothing
-            there.
+            there, unless the points are in general position, where every dissection is a triangulation.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class Restrictions:
                     f"{configuration.name}: --require {_text(face)}: a dissection need not meet a face in common "
                     f"faces, so only simplices with {chirotope.dimension + 1} points can be required of it"
                 )
-            relation = overlap_matrix if dissection else crossing_matrix
+            relation = overlap_matrix if dissection and not chirotope.is_general else crossing_matrix
             keep &= ~relation(chirotope, np.array([face]), simplices)[0]
         for face in self.forbid:
             keep &= np.isin(simplices, face).sum(axis=1) < len(face)

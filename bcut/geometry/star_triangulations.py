@@ -50,7 +50,7 @@ class StarTriangulations:
         members: dict[tuple[int, bool], int] = {}
         sides: list[list[tuple[int, bool]]] = [[] for _ in range(self.size)]
         for position in range(simplices.shape[1]):
-            opposite = np.flatnonzero(~np.isin(simplices[:, position], face))
+            opposite = np.flatnonzero((simplices[:, position, None] != face).all(axis=1))
             numbers = ranks(without(simplices[opposite], position), chirotope.n)
             above = chirotope.sides[numbers, simplices[opposite, position]] > 0
             inside = chirotope.facet_is_interior[numbers]

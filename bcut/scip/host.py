@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -295,6 +296,7 @@ def scip_separators() -> list[str]:
     return sorted(match[1] for match in names if match)
 
 
+@cache
 def scip_version() -> str:
     """Return the version of the SCIP library, such as "10.0.2"."""
     model = Model()

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import floor, gcd, lcm
+from math import gcd, lcm
 from typing import Any
 
 import numpy as np
@@ -133,7 +133,7 @@ def to_integers(cut: Cut, family: str, columns: int) -> IntegerCut:
         raise SeparatorError(family, "a cut's coefficients are all zero")
     order = np.argsort(indices)
     keep = [int(i) for i in order if integers[i] != 0]
-    right = floor(rhs * scale / divisor)
+    right = rhs * scale // divisor
     coprime = [integers[i] // divisor for i in keep]
     if max(abs(value) for value in (right, *coprime)) >= 2**62:
         message = "a cut has numbers of more than 62 bits as coprime integers; no solver can use it"
@@ -148,11 +148,11 @@ class UnusableCutError(SeparatorError):
     """A well-formed cut with numbers that no solver can use; a host drops it."""
 
 
-def _exact(value: Any, family: str) -> Fraction:
-    if isinstance(value, Fraction):
+def _exact(value: Any, family: str) -> int | Fraction:
+    if type(value) is int or isinstance(value, Fraction):
         return value
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
-        return Fraction(int(value))
+        return int(value)
     raise SeparatorError(
         family,
         f"coefficients and right-hand sides are exact (int or Fraction), not {type(value).__name__} {value!r}",

@@ -59,7 +59,7 @@ def solve(
     formulation : {"2", "0", "1", "chambers"}, optional
         The integer program; "2", the cocircuit form, if left out, and "chambers" for dissections.
     spanning : bool
-        Only triangulations that use every point.
+        Only triangulations that use every point; of dissections, those into simplices without further points in them.
     dissection : bool
         Whether simplices need not meet face to face, as long as they do not overlap. In general position they always
         do.

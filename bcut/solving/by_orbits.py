@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.bounds.averaged import AveragedPart
+from bcut.bounds.orbit_root import orbit_root
 from bcut.errors import TooLargeError
 from bcut.formulations.partial_cocircuits import partial_cocircuit_formulation
 from bcut.geometry.chirotope import Chirotope
@@ -23,13 +24,16 @@ from bcut.geometry.partial_chirotope import PartialChirotope
 from bcut.geometry.permutations import PermutationGroup
 from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import make_objective
+from bcut.result import Certificate
 from bcut.separation.driver import FamilyStatistics
+from bcut.solving.capping import are_too_different, limit_of_costs, limited
 from bcut.solving.certificates import case_data, make_orbit_certificate
 from bcut.solving.invariant_search import PASSES, find_invariant_triangulation
 from bcut.solving.orbit_branching import branch_over_faces
-from bcut.solving.orbit_stage import OrbitStage
+from bcut.solving.orbit_stage import MAX_COLUMNS, OrbitStage
+from bcut.solving.report import settles
 from bcut.solving.search import Part, Search, branch
-from bcut.solving.strategies import is_optimal
+from bcut.solving.strategies import is_optimal, is_resolved
 
 if TYPE_CHECKING:
     from bcut.scip.host import TreeStatus
@@ -44,6 +48,8 @@ _MOST_TO_IMPROVE = 60_000
 _SECONDS_TO_IMPROVE = 60.0
 # Of the time that is left, for invariant triangulations that reach the bound.
 _SHARE_FOR_TARGET = 0.4
+# So many targets of invariant triangulations go up by one unit each, before steps grow.
+_STEADY = 10
 # Branching over faces lists the signs of all sets of d + 1 points; its share of the time that is left, and its time
 # where there is no limit; how long it may look for an exact proof of what SCIP has refuted already.
 _MOST_SIGNS = 1_000_000
@@ -129,11 +135,14 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
     best = _Best(search.whole, search.columns)
     search.offer(search.whole.columns)
     best.keep(search)
+    stage = _capped(search, stage)
+    best.keep(search)
     stage = bound_by_orbits(search, stage, cuts=cuts)
     if search.bound is None:
         return
     objective = stage.objective
-    search.raise_bound(objective.rounded_up(search.bound))
+    search.raise_bound(search.rounded_up(search.bound))
+    proven, coarsest = search.bound, objective.restricted_to(np.array([], dtype=np.intp))
     refuted = 0
     while not is_optimal(search):
         # With large costs there may be many values below the optimum: the target moves in growing steps.
@@ -146,6 +155,7 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             break
         search.whole, search.columns = Part.whole(formulation, costs), None
         search.columns_after_fixing = len(formulation.simplices)
+        coarsest = max(coarsest, costs, key=lambda some: some.largest_cost)
         try:
             outcome = _reach(search, stage, target, best, cuts)
         finally:
@@ -160,6 +170,30 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             search.status = outcome
             return
     search.status = "optimal" if is_optimal(search) else "limit"
+    certificate = search.certificate or Certificate()
+    # Solvers know nothing of such values, and only what is proven without them counts.
+    if is_optimal(search) and not is_resolved(coarsest, search.value) and not settles(search, certificate):
+        search.status, search.bound = "limit", proven
+
+
+def _capped(search: Search, stage: OrbitStage) -> OrbitStage:
+    """Return the stage with costs that solvers can compare, where they are too different and all can be listed.
+
+    No triangulation that is better than the one that the search then has loses by it.
+    """
+    if stage.root.bound is None or not are_too_different(stage.objective):
+        return stage
+    everything = stage.target_for(MAX_COLUMNS)
+    if stage.columns_within(everything) < stage.formulation.sizes.sum():
+        return stage
+    formulation, costs = stage.residual(everything)
+    search.whole, search.columns = Part.whole(formulation, costs), None
+    limit = limit_of_costs(search)
+    if limit is None:
+        return stage
+    objective = limited(stage.objective, limit)
+    root = orbit_root(stage.formulation, objective, method="interior", seconds=search.seconds_left)
+    return stage if root.bound is None else replace(stage, objective=objective, root=root)
 
 
 class _Best:
@@ -201,9 +235,12 @@ def solve_invariant(
     if search.bound is None:
         return
     objective = stage.objective
-    target = objective.rounded_up(search.bound)
+    proven = bound = objective.rounded_up(search.bound)
+    refuted = 0
     while True:
-        search.raise_bound(target)
+        search.raise_bound(bound)
+        # With costs that are no small multiples of a unit, steps of one unit would never come to an end.
+        target = bound + ((1 << max(0, refuted - _STEADY)) - 1) * objective.unit
         try:
             formulation, costs = stage.residual(target)
         except TooLargeError:
@@ -218,7 +255,7 @@ def solve_invariant(
                 stage.group,
                 # On all columns there is nothing that a higher target could add.
                 cutoff=None if everything else target + objective.unit / 2,
-                goal=target,
+                goal=bound,
                 deadline=search.deadline,
                 seed=search.seed,
                 subgroups=subgroups,
@@ -231,10 +268,13 @@ def solve_invariant(
             return
         if everything or found.columns is not None:
             search.status = "infeasible" if search.value is None else "optimal"
-            if search.value is not None:
+            if search.value is not None and not is_resolved(costs, search.value):
+                search.status, search.bound = "limit", proven
+            elif search.value is not None:
                 search.raise_bound(search.sign * search.value)
             return
-        target += objective.unit
+        refuted += 1
+        bound = target + objective.unit
 
 
 def _reach(

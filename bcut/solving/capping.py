@@ -1,9 +1,11 @@
 """Sums whose costs have very different sizes, such as aspect ratios: what is too dear for an optimum is made cheaper.
 
-A sliver's aspect ratio may be 10^12 times that of a good simplex, and tolerances of solvers are relative to the largest
-cost. Where no cost is negative (and the sum is minimised), no simplex of an optimum costs more than all of a known
-triangulation. So costs above a cap beyond that may be lowered to the cap: the optima and their values stay, and a bound
-for the lower costs is a bound for the true ones.
+A sliver's aspect ratio may be 10^12 times that of a good simplex, a price that is to keep simplices out may be as high,
+and tolerances of solvers are relative to the largest cost. Let the sum be minimised, v be its value for a known
+triangulation, and g the sum of the absolute values of all negative costs. A triangulation with a simplex that costs
+more than v + g is worse than the known one, since the others cost at least -g together. So costs above a cap beyond
+v + g may be lowered to the cap: the optima and their values stay, and a bound for the lower costs is a bound for the
+true ones.
 """
 
 from __future__ import annotations
@@ -11,31 +13,47 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from fractions import Fraction
 from math import frexp
 
 import numpy as np
 
-from bcut.objectives.objective import Bottleneck
+from bcut.objectives.objective import Bottleneck, Objective
 from bcut.solving.bottleneck import without_bad_simplices
 from bcut.solving.search import Part, Search
 
-# Costs that are no larger than so many times the median do no harm.
-_SPREAD = 1000.0
+# Costs that are no larger than so many times nearly all of them do no harm.
+_SPREAD, _NEARLY_ALL = 1000.0, 0.02
 
 
 @contextmanager
 def capped_costs(search: Search) -> Iterator[None]:
     """Cap the costs of a search within the block, where they are too different for solvers."""
     whole = search.whole
-    objective = whole.objective
-    signed = objective.sign * objective.costs
-    if not len(signed) or signed.min() < 0 or signed.max() <= _SPREAD * np.median(signed):
+    limit = limit_of_costs(search)
+    if limit is not None:
+        search.whole = Part(whole.formulation, limited(whole.objective, limit), whole.columns)
+    try:
         yield
-        return
+    finally:
+        search.whole = whole
+
+
+def limit_of_costs(search: Search) -> Fraction | None:
+    """Return the cost beyond which no simplex is in a better triangulation than one that the search now has.
+
+    Returns
+    -------
+    Fraction or None
+        A cap, with the sign of the costs; None where their sizes do no harm, or no triangulation is found.
+    """
+    objective = search.whole.objective
+    if not are_too_different(objective):
+        return None
     worst = Bottleneck(objective.name, objective.sense, objective.numerators, objective.denominator)
     found = without_bad_simplices(
         Search(
-            whole=replace(whole, objective=worst),
+            whole=replace(search.whole, objective=worst),
             make_separators=list,
             deadline=search.deadline,
             on_progress=search.on_progress,
@@ -47,18 +65,28 @@ def capped_costs(search: Search) -> Iterator[None]:
     if found is not None:
         search.offer(found)
     if search.value is None:
-        yield
-        return
-    # A power of two that is at least twice the value.
-    cap = 2.0 ** (frexp(abs(float(search.value)))[1] + 1)
-    limit = objective.sign * min(cap, objective.largest_cost)
+        return None
+    # A power of two that is at least twice as much.
+    cap = 2.0 ** (frexp(abs(float(search.value)) + _gained(objective))[1] + 1)
+    return objective.sign * Fraction(min(cap, objective.largest_cost))
+
+
+def are_too_different(objective: Objective) -> bool:
+    """Tell whether some costs are so large that a cap may be needed, and that there may be one."""
+    signed = objective.sign * objective.costs
+    if objective.counts_units or not len(signed):
+        return False
+    usual = float(np.quantile(np.abs(signed), _NEARLY_ALL))
+    return float(signed.max()) > max(_SPREAD * usual, 2 * _gained(objective))
+
+
+def _gained(objective: Objective) -> float:
+    """Return what all negative costs come to, without their sign."""
+    return float(np.abs(np.minimum(objective.sign * objective.costs, 0)).sum())
+
+
+def limited(objective: Objective, limit: Fraction) -> Objective:
+    """Return an objective without costs beyond a limit."""
     lower = np.minimum if objective.sign > 0 else np.maximum
-    if objective.are_doubles:
-        numerators = lower(objective.numerators, limit)
-    else:
-        numerators = lower(objective.numerators, int(limit * objective.denominator))
-    search.whole = Part(whole.formulation, replace(objective, numerators=numerators), whole.columns)
-    try:
-        yield
-    finally:
-        search.whole = whole
+    bound = float(limit) if objective.are_doubles else int(limit * objective.denominator)
+    return replace(objective, numerators=lower(objective.numerators, bound))

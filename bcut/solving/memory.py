@@ -113,17 +113,22 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
     def hook(unraisable: sys.UnraisableHookArgs) -> None:
         if unraisable.exc_type is KeyboardInterrupt:
             unheard.set()
+            if watcher.ident is None:
+                watcher.start()
         else:
             previous(unraisable)
 
     watcher = threading.Thread(target=look, name="bcut-limits", daemon=True)
-    watcher.start()
+    # Without limits there is nothing to look at until an interrupt goes unheard.
+    if memory is not None or deadline is not None:
+        watcher.start()
     sys.unraisablehook = hook
     try:
         yield
     finally:
         ended.set()
-        watcher.join()
+        if watcher.ident is not None:
+            watcher.join()
         sys.unraisablehook = previous
         if ignored:
             signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -132,7 +132,6 @@ def solve_face(
     )
     root = bound_at_root(face, part, None)
     if root.last is not None:
-        face.raise_bound(root.last.value)
         _reach_optimum(face, root.last)
     if face.status == "interrupted":
         search.status = "interrupted"

@@ -6,6 +6,7 @@ import platform
 import time
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from math import ceil, floor
 from typing import Any
 
@@ -201,15 +202,21 @@ def gap(value: Fraction | None, proven: Fraction | None) -> float | None:
 
 
 def _versions() -> dict[str, str]:
-    from importlib.metadata import version
-
     return {
         "bcut": bcut.__version__,
         "scip": _scip_version(),
-        "pyscipopt": version("pyscipopt"),
-        "highs": version("highspy"),
+        "pyscipopt": _installed("pyscipopt"),
+        "highs": _installed("highspy"),
         "python": platform.python_version(),
     }
+
+
+@cache
+def _installed(package: str) -> str:
+    """Return the version of a package; reading its metadata takes as long as solving a small instance."""
+    from importlib.metadata import version
+
+    return version(package)
 
 
 def _scip_version() -> str:

@@ -25,6 +25,7 @@ from bcut.solving.bottleneck import solve_bottleneck
 from bcut.solving.by_elimination import empty_part, solve_by_elimination
 from bcut.solving.by_fixing import bound_by_fixing, solve_by_fixing
 from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
+from bcut.solving.capping import capped_costs
 from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
 from bcut.solving.compact_part import begin_fixing, make_program, without_columns
 from bcut.solving.embedding import costs_to_embed
@@ -230,7 +231,8 @@ class Run:
             else:
                 solve_invariant(self.search, self.stage, self.subgroups, cuts=self.link)
         elif self.method == "scip":
-            solve_in_scip(self.search)
+            with capped_costs(self.search):
+                solve_in_scip(self.search)
         elif self.method == "fixing":
             solve_by_fixing(self.search)
         elif self.method == "elimination":
@@ -255,13 +257,8 @@ class Run:
             solve_bottleneck(search, branching=False)
             return
         root = bound_at_root(search, search.whole, search.separation(search.whole))
-        if root.status == "infeasible":
-            search.status = "infeasible"
-        search.exact = root.first
-        if root.last is not None:
-            search.raise_bound(root.last.value)
-        if root.status == "limit":
-            search.status = "limit"
+        if root.status == "infeasible" or root.status == "limit":
+            search.status = root.status
 
     def hand_out(self) -> None:
         """Have some triangulation where the search has none: it costs next to nothing."""

@@ -194,7 +194,9 @@ def bound_at_root(
 ) -> RootBound:
     """Run the cutting-plane loop on a part; keep an integral point as a triangulation.
 
-    Without a deadline the loop ends by itself. With a `target` it ends as soon as the bound exceeds it.
+    Without a deadline the loop ends by itself. With a `target` it ends as soon as the bound exceeds it. What
+    relaxations of the whole prove is kept at once, as ``search.exact`` and in the bound: it stands however the loop
+    ends.
     """
 
     def on_round(finished: Round) -> None:
@@ -205,7 +207,7 @@ def bound_at_root(
         search.report("root", lp=finished.lp, cuts=sum(finished.cuts.values()))
 
     def on_relaxed(known: RootBound) -> None:
-        # What is kept if separation does not come to an end. Parts, and targets, say nothing of the whole.
+        # Parts, and targets, say nothing of the whole.
         if part is not search.whole or target is not None:
             return
         if search.lp is None:

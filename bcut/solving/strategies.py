@@ -6,11 +6,14 @@ from fractions import Fraction
 from typing import Literal
 
 from bcut.bounds.root import RootBound, Stage
+from bcut.objectives.objective import Objective
 from bcut.solving.sampling import sample_vertices
 from bcut.solving.search import Part, Search, bound_at_root, branch, place
 
 # A value within this relative distance of the bound counts as optimal where values are not integral.
 RELATIVE_GAP = 1e-9
+# The largest cost may be so many times a value that solvers find.
+_RESOLVED = 1000.0
 # So many targets go up by one step each, before steps grow: on targets that are met exactly, little is left to search.
 _STEADY = 3
 
@@ -28,7 +31,6 @@ def solve_by_targets(search: Search) -> None:
     if root.first is None:
         _note_infeasible(search, root)
         return
-    search.exact = root.first
     reach_targets(search)
 
 
@@ -112,11 +114,9 @@ def _reach(
 def solve_at_once(search: Search) -> None:
     """Cut the relaxation of all columns, then hand it to SCIP with its cuts: any objective."""
     root = bound_at_root(search, search.whole, search.separation(search.whole))
-    if root.status == "infeasible" or root.first is None or root.last is None:
+    if root.status == "infeasible" or root.first is None:
         _note_infeasible(search, root)
         return
-    search.exact = root.first
-    search.raise_bound(root.last.value)
     if root.status == "integral" and _is_close(search):
         search.status = "optimal"
         return
@@ -147,8 +147,22 @@ def _is_close(search: Search) -> bool:
     return float(search.sign * value - bound) <= RELATIVE_GAP * size
 
 
+def is_resolved(objective: Objective, value: Fraction | None) -> bool:
+    """Tell whether a solver can tell the value of a best triangulation from others.
+
+    Its tolerances are relative to the largest cost, so where costs of opposite signs nearly cancel, or a triangulation
+    has cheap simplices only, they say next to nothing of the value.
+    """
+    size = max(abs(float(value or 0)), min(1.0, objective.largest_cost))
+    return objective.counts_units or objective.largest_cost <= _RESOLVED * size
+
+
 def _finish(search: Search, status: str) -> None:
     if status == "optimal":
+        if not is_resolved(search.whole.objective, search.value):
+            # What SCIP's bound says within its tolerance is all there is.
+            search.status = "optimal" if _is_close(search) else "limit"
+            return
         search.status = "optimal"
         # SCIP stops at its own tolerance; its bound is the value then.
         assert search.value is not None

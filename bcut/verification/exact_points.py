@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from functools import cache
-from itertools import pairwise
+from functools import cache, cached_property
+from itertools import combinations, pairwise
 from math import factorial, lcm
 from operator import mul
 from typing import Any
@@ -79,7 +79,7 @@ class ExactPoints:
         if field.degree == 1:
             self._integers = self._by_point([row[0] for row in integers])
             return
-        elements = [AlgebraicNumber(field, tuple(map(Fraction, row))) for row in integers]
+        elements = [AlgebraicNumber(field, tuple(row)) for row in integers]
         self._exact = self._by_point(elements)
         irrational = field.enclosures(_BITS)[1:]
         self._integers = self._by_point(
@@ -180,6 +180,15 @@ class SideTable:
         if found is None:
             found = self._sides[facet] = self.points.sides(self.points.hyperplane(facet))
         return found
+
+    @cached_property
+    def is_general(self) -> bool:
+        """Whether no d + 1 points lie in a common hyperplane; this looks at all d-tuples."""
+        everything = (1 << self.points.n) - 1
+        facets = combinations(range(self.points.n), self.points.dimension)
+        return all(
+            plus | minus | mask_of(facet) == everything for facet in facets for plus, minus in [self[facet]]
+        )
 
     def orientation(self, simplex: Simplex) -> int:
         """Return the sign of ``det(t_1 - t_0, ..., t_d - t_0)`` of an ascending (d+1)-tuple t."""

@@ -74,16 +74,20 @@ class RestrictionData:
     def admit(self, sides: SideTable, simplex: Simplex) -> bool:
         """Tell whether a triangulation with these restrictions may use a d-simplex.
 
-        One that has the face f uses no simplex that meets f in something else than a common face.
+        One that has the face f uses no simplex that meets f in something else than a common face. A dissection that has
+        the d-simplex f uses none that overlaps it; faces of smaller dimensions say so much only where the points are in
+        general position, since every dissection is a triangulation there.
         """
         if self.star is not None and self.star not in simplex:
             return False
         if any(set(face) <= set(simplex) for face in self.forbid):
             return False
         for face in self.require:
-            if self.dissection:
+            if self.dissection and len(face) == len(simplex):
                 if simplex != face and overlap(sides, simplex, face):
                     return False
+            elif self.dissection and not sides.is_general:
+                continue
             elif not set(face) <= set(simplex) and cross(sides, simplex, face):
                 return False
         return True

@@ -7,33 +7,27 @@ from typing import Any
 import click
 
 from bcut.cli.options import (
-    instance_argument,
-    objective_options,
-    report_options,
+    method_option,
+    problem_options,
     run_options,
     separator_options,
-    symmetry_options,
+    symmetries_option,
 )
 from bcut.cli.running import carry_out
 
 
 @click.command(short_help="Bound the optimum at the root, before and after cuts.")
-@instance_argument
-@objective_options
+@problem_options
 @separator_options
-@click.option(
-    "--method",
-    type=click.Choice(["auto", "listing", "orbits", "fixing"]),
-    default="auto",
-    show_default=True,
-    help="listing: all simplices. orbits: orbits of simplices under the symmetries that keep the costs "
-    "(cardinality and costs:FILE only; of the separators only link is at work). fixing: a first-order method for "
-    "all simplices, cuts for the few that matter. auto: orbits for large symmetric configurations, fixing for "
-    "other large ones, else listing.",
+@method_option(
+    listing="all simplices",
+    orbits="orbits of simplices under the symmetries that keep the costs (cardinality and costs:FILE only; of the "
+    "separators only link is at work)",
+    fixing="a first-order method for all simplices, cuts for the few that matter",
+    auto="orbits for large symmetric configurations, fixing for other large ones, else listing",
 )
-@symmetry_options
+@symmetries_option
 @run_options
-@report_options
 def bound(**options: Any) -> int:
     """Bound the optimum of INSTANCE at the root, before and after the cuts of the separators given.
 

@@ -7,13 +7,12 @@ from typing import Any
 
 import click
 
-from bcut.cli.options import instance_argument, objective_options
+from bcut.cli.options import problem_options
 
 
 @click.command(short_help="Write the integer program as an LP or MPS file.")
-@instance_argument
+@problem_options
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.lp|FILE.mps")
-@objective_options
 def export(instance: str, file: Path, **options: Any) -> int:
     """Write the integer program of INSTANCE to a file that other solvers read; the suffix tells the format.
 

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import click
 
+from bcut.cli.options import result_argument
+
 
 @click.command(short_help="Draw the triangulation of a result file (2D or 3D).")
-@click.argument("result", type=click.Path(path_type=Path))
+@result_argument
 @click.argument("picture", type=click.Path(path_type=Path), metavar="PICTURE.svg|PICTURE.png")
 @click.option(
     "--explode",

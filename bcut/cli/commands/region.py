@@ -6,17 +6,12 @@ from typing import Any
 
 import click
 
-from bcut.cli.options import instance_argument, report_options
+from bcut.cli.options import instance_argument, report_options, time_limit_option
 
 
 @click.command(short_help="Triangulate what a closed surface bounds, or prove that there is no way.")
 @instance_argument
-@click.option(
-    "--time-limit",
-    type=float,
-    metavar="S",
-    help="Stop after S seconds with what was found (exit status 3).",
-)
+@time_limit_option
 @report_options
 def region(instance: str, time_limit: float | None, output: Any, as_json: bool, quiet: bool) -> int:
     """Triangulate the region inside the closed surface INSTANCE, without new points.

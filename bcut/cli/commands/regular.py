@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from bcut.cli.options import json_option
+from bcut.cli.options import json_option, result_argument
 
 
 @click.command(short_help="Tell whether the triangulation of a result is regular.")
-@click.argument("result", type=click.Path(path_type=Path))
+@result_argument
 @json_option
 def regular(result: Path, as_json: bool) -> int:
     """Tell whether the triangulation in the file RESULT is regular: the lower side of its points' lifted hull.

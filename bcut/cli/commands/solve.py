@@ -7,19 +7,17 @@ from typing import Any
 import click
 
 from bcut.cli.options import (
-    instance_argument,
-    objective_options,
-    report_options,
+    method_option,
+    problem_options,
     run_options,
     separator_options,
-    symmetry_options,
+    symmetries_option,
 )
 from bcut.cli.running import carry_out
 
 
 @click.command(short_help="Find an optimal triangulation.")
-@instance_argument
-@objective_options
+@problem_options
 @click.option(
     "--then",
     multiple=True,
@@ -28,19 +26,16 @@ from bcut.cli.running import carry_out
     "--objective max-min:dihedral-angle --then cardinality.",
 )
 @separator_options
-@click.option(
-    "--method",
-    type=click.Choice(["auto", "listing", "orbits", "fixing", "elimination", "scip"]),
-    default="auto",
-    show_default=True,
-    help="listing: list all simplices, bound and fix at the root, then branch on what is left. orbits: the same "
-    "with orbits of simplices under the symmetries that keep the costs (cardinality and costs:FILE only). "
-    "fixing: bound by a first-order method; solvers see the few simplices that the bound leaves. elimination: "
-    "take edges away by theorems (--objective weight --spanning in the plane only). scip: leave everything to "
-    "SCIP. auto: orbits for large symmetric configurations, elimination or fixing for other large ones, else "
-    "listing.",
+@method_option(
+    listing="list all simplices, bound and fix at the root, then branch on what is left",
+    orbits="the same with orbits of simplices under the symmetries that keep the costs (cardinality and costs:FILE "
+    "only)",
+    fixing="bound by a first-order method; solvers see the few simplices that the bound leaves",
+    elimination="take edges away by theorems (--objective weight --spanning in the plane only)",
+    scip="leave everything to SCIP",
+    auto="orbits for large symmetric configurations, elimination or fixing for other large ones, else listing",
 )
-@symmetry_options
+@symmetries_option
 @click.option(
     "--invariant-under",
     metavar="ORDER|FILE",
@@ -48,7 +43,6 @@ from bcut.cli.running import carry_out
     "generate, or some subgroup of this order.",
 )
 @run_options
-@report_options
 def solve(**options: Any) -> int:
     """Find an optimal triangulation of INSTANCE and prove it optimal.
 

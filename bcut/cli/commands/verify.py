@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from bcut.cli.options import json_option
+from bcut.cli.options import json_option, result_argument
 
 
 @click.command(short_help="Re-check a result file exactly, without any solver.")
-@click.argument("result", type=click.Path(path_type=Path))
+@result_argument
 @json_option
 @click.option("--quiet", is_flag=True, help="Print nothing where the result holds: the exit status says it.")
 def verify(result: Path, as_json: bool, quiet: bool) -> int:

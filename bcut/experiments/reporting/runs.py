@@ -126,7 +126,7 @@ class Run:
         """Whether the run did what it is for: an optimum, or the whole gap closed, and no other run denies it.
 
         At the root an outcome that is "integral" counts too, whatever that means for the preset: see
-        `bcut.experiments.presets.Run.outcome`.
+        `bcut.experiments.outcome.RunOutcome`.
         """
         if self.disputed:
             return False

@@ -62,7 +62,9 @@ class _Search:
         packed = np.packbits(crossings, axis=1, bitorder="little")
         self.adjacent = [int.from_bytes(row.tobytes(), "little") for row in packed]
         self.weight = np.rint(values * _UNIT).astype(np.int64).tolist()
-        self.remaining = (1 << len(values)) - 1
+        self.remaining = everything = (1 << len(values)) - 1
+        # Those that may stand in one stable set with a node.
+        self.apart = [everything & ~(near | 1 << node) for node, near in enumerate(self.adjacent)]
         self.spent = self.share = 0
         self.dived = False
         self.best = self.best_weight = 0
@@ -99,24 +101,26 @@ class _Search:
         Nodes are covered by stable sets with multiplicities; a clique has at most one node of each. Nodes
         within the first `slack` of the cover cannot lead to anything better and are left out.
         """
-        residual = {node: self.weight[node] for node in _bits(candidates)}
+        weight, apart = self.weight, self.apart
         listed: list[tuple[int, int]] = []
-        if sum(residual.values()) <= slack:
+        if sum([weight[node] for node in _bits(candidates)]) <= slack:
             return listed
+        residual = weight.copy()
         total = 0
         while candidates:
             stable, open_nodes, share = [], candidates, _UNIT
             while open_nodes:
                 node = (open_nodes & -open_nodes).bit_length() - 1
                 stable.append(node)
-                share = min(share, residual[node])
-                open_nodes &= ~self.adjacent[node] & ~(1 << node)
+                if residual[node] < share:
+                    share = residual[node]
+                open_nodes &= apart[node]
             total += share
             self.spent += len(stable)
             for node in stable:
                 residual[node] -= share
                 if not residual[node]:
-                    candidates &= ~(1 << node)
+                    candidates ^= 1 << node
                     if total > slack:
                         listed.append((node, total))
         listed.reverse()
