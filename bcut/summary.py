@@ -103,6 +103,8 @@ def _status(result: Result) -> str:
     text = _MEANING.get(result.status, result.status)
     if result.status in ("optimal", "infeasible"):
         return f"{text} ({_reason(result)})"
+    if result.status == "limit" and not any(limit is not None for limit in result.problem.limits.values()):
+        text = "a limit of the solvers' accuracy, or of what fits into memory, came first"
     return text if not result.gap else f"{text}; gap {100 * result.gap:.2f} %"
 
 

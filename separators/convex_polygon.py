@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.geometry.chirotope import Chirotope
+from bcut.geometry.partial_chirotope import PartialChirotope
 from bcut.separation.seam import Cut, FractionalPoint, Problem, Separator
 
 # A cut counts as violated from this much on.
@@ -63,7 +64,11 @@ class ConvexPolygon(Separator):
         """Prepare the sides of all lines through two points."""
         super().setup(problem)
         if problem.dimension == 2:
-            self.lines = Lines(problem.chirotope)
+            chirotope = problem.chirotope
+            if isinstance(chirotope, PartialChirotope):
+                # Programs over orbits have no table of signs; in the plane it is small.
+                chirotope = Chirotope.of(problem.configuration)
+            self.lines = Lines(chirotope)
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
         """Yield the cuts of violated polygons, at most one around each triangle, most violated first."""

@@ -67,9 +67,7 @@ class Parity(Separator):
         self.rows = abs(matrix).tocsr()
         self.columns = self.rows.tocsc()
         starts, indices, odd = self.rows.indptr, self.rows.indices, self.rows.data % 2 == 1
-        self.odd = [
-            indices[start:end][odd[start:end]] for start, end in pairwise(starts)
-        ]
+        self.odd = [indices[start:end][odd[start:end]] for start, end in pairwise(starts)]
 
     def separate(self, point: FractionalPoint) -> Iterator[Cut]:
         """Yield the most violated cut of every row of the eliminated system, most violated first."""

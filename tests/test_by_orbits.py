@@ -99,6 +99,15 @@ def test_other_families_than_link_get_the_listing(monkeypatch: pytest.MonkeyPatc
     assert bcut.bound("cube:3", separators=["link", "clique"]).problem.method == "listing"
 
 
+@pytest.mark.parametrize("name", ["clique", "convex-polygon", "face-crossing", "odd-cycle", "parity"])
+def test_every_family_works_in_the_tree_over_orbits(name: str) -> None:
+    """Programs over orbits have no table of signs, which some families would take if they could."""
+    points = [[1, 0], [2, 0], [2, 1], [2, 3], [0, 0], [0, 1]]
+    result = bcut.solve(points, sense="max", method="orbits", separators=[name])
+    assert result.separators[name]
+    assert (result.status, result.value) == ("optimal", bcut.solve(points, sense="max").value)
+
+
 def test_orbits_refuse_what_is_not_known_to_be_invariant() -> None:
     with pytest.raises(InputError, match=r"random-costs:1.*cardinality"):
         bcut.solve("cube:3", objective="random-costs:1", method="orbits")

@@ -161,6 +161,7 @@ def test_costs_that_cancel_are_not_called_optimal_before_they_are(
     assert result.bound is not None
     assert result.bound <= best if sense == "min" else result.bound >= best
     assert (result.status == "optimal") <= (result.value == best)
+    assert ("a limit of the solvers' accuracy" in str(result)) == (result.status == "limit")
     assert verify(result).value == result.value
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from itertools import combinations
 from typing import Any
 
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from bcut.bounds.root import root_bound
 from bcut.errors import ResultError, VerificationError
 from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.formulations.formulation import Formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.crossings import crossing_matrix
@@ -298,6 +300,13 @@ def test_certificates_prove_exactly_what_they_claim(
     assert verification.value == value
 
 
+@cache
+def listed(name: str, spanning: bool) -> tuple[Formulation, list[tuple[int, ...]]]:
+    """A program and all its triangulations."""
+    formulation = cocircuit_formulation(load_instance(name), spanning=spanning)
+    return formulation, list(triangulations(formulation.chirotope, spanning=spanning))
+
+
 RATIONALS = st.fractions(min_value=-4, max_value=4, max_denominator=6)
 
 
@@ -311,8 +320,7 @@ def test_any_multipliers_give_a_bound_on_every_triangulation(
     name: str, sense: str, data: st.DataObject
 ) -> None:
     family, _, spanning = name.partition(" ")
-    configuration = load_instance(family)
-    formulation = cocircuit_formulation(configuration, spanning=bool(spanning))
+    formulation, every = listed(family, bool(spanning))
     facets = [facet for facet in formulation.row_faces if facet is not None]
     costs = {tuple(simplex): data.draw(RATIONALS) for simplex in formulation.simplices.tolist()}
     flag = data.draw(st.permutations(data.draw(st.sampled_from(formulation.chirotope.bases.tolist()))))
@@ -323,7 +331,7 @@ def test_any_multipliers_give_a_bound_on_every_triangulation(
         cocircuits={facet: data.draw(RATIONALS) for facet in data.draw(st.sets(st.sampled_from(facets)))},
     )
     found = certified_bound(
-        ExactPoints(configuration.scalars()),
+        ExactPoints(formulation.configuration.scalars()),
         certificate,
         Costs(lambda simplices: [costs[simplex] for simplex in simplices], integral=False),
         sense=sense,
@@ -332,10 +340,7 @@ def test_any_multipliers_give_a_bound_on_every_triangulation(
     assert found.candidates == len(formulation.simplices)
     assert found.bound is not None
     simplices = [tuple(simplex) for simplex in formulation.simplices.tolist()]
-    values = [
-        sum(costs[simplices[column]] for column in chosen)
-        for chosen in triangulations(formulation.chirotope, spanning=bool(spanning))
-    ]
+    values = [sum(costs[simplices[column]] for column in chosen) for chosen in every]
     assert found.bound <= min(values) if sense == "min" else found.bound >= max(values)
 
 

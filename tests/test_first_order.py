@@ -136,6 +136,18 @@ def test_coverage_points_mark_simplices_that_contain_a_point(
     assert len(np.unique(rows, axis=0)) > 6
 
 
+@pytest.mark.parametrize("exponent", [-330, 330])
+def test_coverage_points_do_not_depend_on_the_size_of_coordinates(exponent: int) -> None:
+    """Volumes of four dimensions would be beyond the range of doubles there."""
+    configuration = bcut.load_instance("random:10,4,seed=3")
+    scaled = bcut.PointConfiguration.from_values(np.ldexp(configuration.floats, exponent))
+    plain, far = (
+        coverage_points(cocircuit_formulation(points, spanning=True)).toarray()
+        for points in (configuration, scaled)
+    )
+    np.testing.assert_array_equal(plain, far)
+
+
 def solution_of(formulation: Formulation) -> np.ndarray:
     """Return a point of the relaxation."""
     return linprog(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -47,6 +48,7 @@ SMALL = [
 ]
 
 
+@cache
 def problem_of(name: str, spanning: bool = False) -> Problem:
     return Problem(cocircuit_formulation(load_instance(name), spanning=spanning))
 
@@ -64,11 +66,13 @@ def as_certified(problem: Problem, cut: Cut) -> CertificateCut:
     return CertificateCut("link", simplices, coefficients, Fraction(cut.rhs), Fraction(0), cut.proof)
 
 
+@cache
 def triangulation_matrix(problem: Problem) -> np.ndarray:
     rows = list(triangulations(problem.chirotope, spanning=problem.formulation.spanning))
     matrix = np.zeros((len(rows), len(problem.simplices)), dtype=np.int64)
     for number, row in enumerate(rows):
         matrix[number, list(row)] = 1
+    matrix.setflags(write=False)
     return matrix
 
 
@@ -219,7 +223,7 @@ def test_no_cut_removes_a_triangulation(name: str, spanning: bool, lift: bool) -
 
 def affine_points(matrix: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
     """Random points of the affine hull of the triangulations, clipped to what a relaxation could return."""
-    points = []
+    points, matrix = [], matrix.astype(float)
     for _ in range(20):
         weights = rng.normal(size=len(matrix))
         weights[rng.random(len(matrix)) < 0.7] = 0

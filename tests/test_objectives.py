@@ -15,6 +15,7 @@ import bcut.instances
 from bcut.errors import InputError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
+from bcut.geometry.configuration import PointConfiguration
 from bcut.instance import load_instance
 from bcut.objectives.measures import MEASURES, read_costs
 from bcut.objectives.objective import from_fractions, make_objective
@@ -231,3 +232,20 @@ def test_read_costs_returns_the_default_and_the_table(tmp_path: Path) -> None:
         Fraction(1, 2),
         {(0, 1, 3): Fraction(4)},
     )
+
+
+def test_costs_beyond_the_range_of_doubles_are_refused() -> None:
+    """Exact volumes may be smaller, or add up to more, than a double can be."""
+    for scale, message in (
+        (1e-120, "the largest cost is about 1e-360, below the range"),
+        (1e95, "sums beyond the range"),
+    ):
+        points = (scale * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])).tolist()
+        formulation = cocircuit_formulation(PointConfiguration.from_values(points))
+        with pytest.raises(InputError, match=message):
+            make_objective("volume", formulation)
+        assert make_objective("cardinality", formulation).largest_cost == 1
+    for scale in (1e-95, 1e90):
+        points = (scale * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])).tolist()
+        formulation = cocircuit_formulation(PointConfiguration.from_values(points))
+        assert make_objective("volume", formulation).largest_cost > 0

@@ -18,7 +18,7 @@ from bcut.bounds import relaxation as relaxation_module
 from bcut.bounds import root as root_module
 from bcut.bounds.relaxation import InfeasibleRelaxationError, Relaxation
 from bcut.bounds.root import RootBound, RootLimits, Round, root_bound
-from bcut.errors import SeparatorError
+from bcut.errors import SeparatorError, SolverError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import Formulation
 from bcut.instance import load_instance
@@ -229,6 +229,19 @@ def test_a_target_that_can_be_reached_keeps_all_that_reach_it(
     assert found.separation is not None
     assert len(found.separation.problem.simplices) == len(found.columns)
     assert all(cut.columns.max() < len(found.columns) for cut in found.cuts)
+
+
+@pytest.mark.parametrize("columns", [[0, 0], [0, 10**6]])
+def test_rows_that_are_none_are_refused(columns: list[int]) -> None:
+    """Without them the relaxation would be another one than its cuts say."""
+    formulation = cocircuit_formulation(load_instance("polygon:6"))
+    relaxation = Relaxation(formulation, make_objective("cardinality", formulation))
+    with pytest.raises(SolverError, match="HiGHS refused the cuts"):
+        relaxation.add([cut_of([1, 2], [1, 1], 1), cut_of(columns, [1, 1], 1)])
+    assert not relaxation.cuts
+    point = relaxation.solve()
+    assert point is not None
+    assert not len(point.slack)
 
 
 def test_cuts_that_coincide_after_fixing_are_one_cut() -> None:

@@ -13,7 +13,7 @@ combination of rows is valid: where a sign is wrong, the row helps less.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +58,11 @@ def coverage_points(
     generator = np.random.default_rng(seed)
     floats = program.configuration.floats
     cells = floats[pulling_triangulation(program.chirotope.hull_facets, len(floats))]
-    volumes = np.abs(np.linalg.det(cells[:, 1:] - cells[:, :1]))
+    scale = _exponent(floats)
+    volumes = _volumes(cells[:, 1:] - cells[:, :1], scale)
     if points is None:
-        points = _number(floats, program.simplices, float(volumes.sum()), generator)
+        corners = floats[program.simplices[generator.integers(len(program.simplices), size=_SAMPLE)]]
+        points = _number(_volumes(corners[:, 1:] - corners[:, :1], scale), float(volumes.sum()))
     targets = spread_points(cells, volumes, points, generator)
     faces, apexes, signs = _faces(program)
     source = _flag_point(floats)
@@ -79,12 +81,19 @@ def coverage_points(
     return sp.csr_array(parts, shape=(len(targets), len(faces) + 1))
 
 
-def _number(
-    floats: NDArray[np.float64], simplices: NDArray[Any], volume: float, generator: np.random.Generator
-) -> int:
+def _exponent(floats: NDArray[np.float64]) -> int:
+    """Return a power of two near the largest absolute value."""
+    return int(np.frexp(np.abs(floats).max(initial=0.0))[1])
+
+
+def _volumes(edges: NDArray[np.float64], exponent: int) -> NDArray[np.float64]:
+    """Return what volumes would be if edges were divided by a power of two: else they may be infinite, or zero."""
+    return np.asarray(np.abs(np.linalg.det(np.ldexp(edges, -exponent))), dtype=np.float64)
+
+
+def _number(sampled: NDArray[np.float64], volume: float) -> int:
     """Return how many points are covered as often as wanted, if the simplices are like some of them."""
-    corners = floats[simplices[generator.integers(len(simplices), size=_SAMPLE)]]
-    share = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).mean()) / volume
+    share = float(sampled.mean()) / volume
     return int(np.clip(_ENTRIES / max(share, 1e-300), _FEWEST, _MOST))
 
 
@@ -133,7 +142,7 @@ def _flag_point(floats: NDArray[np.float64]) -> NDArray[np.float64]:
 def _inverses(edges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the inverses of the transposed matrices, and which of them exist."""
     matrices = np.swapaxes(edges, 1, 2).copy()
-    usable: NDArray[np.bool_] = np.abs(np.linalg.det(matrices)) > 0
+    usable: NDArray[np.bool_] = _volumes(matrices, _exponent(matrices)) > 0
     matrices[~usable] = np.eye(matrices.shape[1])
     return np.asarray(np.linalg.inv(matrices), dtype=np.float64), usable
 

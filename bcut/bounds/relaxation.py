@@ -117,17 +117,29 @@ class Relaxation:
         return smaller
 
     def add(self, cuts: Sequence[IntegerCut]) -> None:
-        """Add cuts as rows."""
+        """Add cuts as rows.
+
+        Raises
+        ------
+        SolverError
+            If HiGHS takes them for no rows; then none of them is added.
+        """
         if not cuts:
             return
+        import highspy
+
         starts = np.cumsum([0, *(len(cut.columns) for cut in cuts[:-1])])
         indices = np.concatenate([cut.columns for cut in cuts])
         values = np.concatenate([cut.coefficients for cut in cuts]).astype(float)
         upper = np.array([float(cut.rhs) for cut in cuts])
         lower = np.full(len(cuts), -np.inf)
-        self._solver.addRows(
+        status = self._solver.addRows(
             len(cuts), lower, upper, len(indices), starts.astype(np.int32), indices.astype(np.int32), values
         )
+        if status == highspy.HighsStatus.kError:
+            raise SolverError(
+                "HiGHS refused the cuts: one of them has a column twice, or entries beyond its range"
+            )
         self.cuts.extend(cuts)
 
     def drop(self, positions: Sequence[int]) -> list[IntegerCut]:

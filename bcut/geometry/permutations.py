@@ -101,17 +101,23 @@ class PermutationGroup:
             If there are more than `limit` elements.
         """
         steps = np.asarray(generators, dtype=index_type(n)).reshape(-1, n)
-        elements = np.arange(n, dtype=index_type(n))[None, :]
-        frontier = elements
-        while len(frontier):
-            products = np.concatenate([step[frontier] for step in steps] or [frontier[:0]])
-            known = np.concatenate((elements, np.unique(products, axis=0)))
-            _, first = np.unique(known, axis=0, return_index=True)
-            frontier = known[np.sort(first[first >= len(elements)])]
-            elements = np.concatenate((elements, frontier))
-            if len(elements) > limit:
+        frontier = np.arange(n, dtype=index_type(n))[None, :]
+        levels, known = [frontier], {frontier.tobytes()}
+        row = np.dtype((np.void, frontier.nbytes))
+        while len(steps):
+            products = np.concatenate([step[frontier] for step in steps])
+            # Sets of rows as bytes are much faster than `np.unique` with an axis where groups are small.
+            listed: list[Any] = products.view(row).ravel().tolist()
+            new = set(listed) - known
+            if not new:
+                break
+            known |= new
+            if len(known) > limit:
                 raise TooLargeError(f"the permutations generate a group of more than {limit:,} elements")
-        return cls.from_elements(elements)
+            frontier = np.frombuffer(b"".join(new), dtype=frontier.dtype).reshape(-1, n)
+            frontier = frontier[np.lexsort(frontier.T[::-1])]
+            levels.append(frontier)
+        return cls.from_elements(np.concatenate(levels))
 
     def reduced(self, limit: int) -> PermutationGroup:
         """Return the largest group of the chain with at most `limit` elements: it fixes the first base points.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, frexp, lcm
+from sys import float_info
 from typing import Any, Protocol
 
 import numpy as np
@@ -241,15 +242,22 @@ def objective_of(name: ObjectiveName, formulation: Candidates) -> Objective:
 
 
 def _check_range(objective: Objective) -> None:
-    """Refuse costs whose sums no double can hold, as solvers and result files need them."""
+    """Refuse costs whose sums, or which themselves, no double can hold, as solvers and result files need them."""
     numerators = objective.numerators
     if not len(numerators):
         return
-    largest = max(abs(Fraction(numerators.min())), abs(Fraction(numerators.max()))) / objective.denominator
+    ends = numerators[[numerators.argmin(), numerators.argmax()]].tolist()
+    largest = max(abs(Fraction(end)) for end in ends) / objective.denominator
     if largest * len(numerators) > _LARGEST_SUM:
         raise InputError(
             f"objective '{objective.name}': costs of {len(str(int(largest)))} digits have sums beyond the range of "
             "float64; scale the costs, or the points they come from"
+        )
+    if 0 < largest < Fraction(float_info.min):
+        size = f"1e-{len(str(int(1 / largest))) - 1}"
+        raise InputError(
+            f"objective '{objective.name}': the largest cost is about {size}, below the range of float64; scale the "
+            "costs, or the points they come from"
         )
 
 

@@ -146,7 +146,9 @@ class Problem:
         """Volumes of all simplices in floating point, shape (m,): to rank them, never to decide."""
         corners = self.configuration.floats[self.simplices]
         edges = corners[:, 1:] - corners[:, :1]
-        return np.abs(np.linalg.det(edges)) / factorial(self.dimension)
+        # Far from 1, all may be infinite, or zero.
+        with np.errstate(over="ignore"):
+            return np.abs(np.linalg.det(edges)) / factorial(self.dimension)
 
     def nearest_first(
         self, candidates: NDArray[np.integer], columns: NDArray[np.integer]

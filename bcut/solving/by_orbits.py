@@ -163,10 +163,9 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
             best.keep(search)
         if outcome == "refuted":
             refuted += 1
-            # SCIP refutes within its tolerances: where units are finer than those, also what was found before.
-            assert best.value is not None
-            search.raise_bound(min(target + objective.unit, search.sign * best.value))
-        elif outcome != "reached":
+            search.raise_bound(target + objective.unit)
+        _within_tolerance(search)
+        if outcome == "limit" or outcome == "interrupted":
             search.status = outcome
             return
     search.status = "optimal" if is_optimal(search) else "limit"
@@ -176,11 +175,17 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
         search.status, search.bound = "limit", proven
 
 
-def _capped(search: Search, stage: OrbitStage) -> OrbitStage:
-    """Return the stage with costs that solvers can compare, where they are too different and all can be listed.
+def _within_tolerance(search: Search) -> None:
+    """Take back what SCIP refuted within its tolerances although it was found; the report tells of anything beyond."""
+    if search.value is None or search.bound is None:
+        return
+    value = search.sign * search.value
+    if value < search.bound <= value + max(Fraction(search.whole.objective.largest_cost), abs(value)) / 10**6:
+        search.bound = value
 
-    No triangulation that is better than the one that the search then has loses by it.
-    """
+
+def _capped(search: Search, stage: OrbitStage) -> OrbitStage:
+    """Return the stage with costs that solvers can compare, where they are too different and all can be listed."""
     if stage.root.bound is None or not are_too_different(stage.objective):
         return stage
     everything = stage.target_for(MAX_COLUMNS)
@@ -272,6 +277,7 @@ def solve_invariant(
                 search.status, search.bound = "limit", proven
             elif search.value is not None:
                 search.raise_bound(search.sign * search.value)
+                _within_tolerance(search)
             return
         refuted += 1
         bound = target + objective.unit

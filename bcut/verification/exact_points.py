@@ -110,7 +110,15 @@ class ExactPoints:
 
     def side(self, plane: Hyperplane, point: int) -> int:
         """Return the sign of the form at a point: -1, 0 or 1."""
-        return 0 if point in plane.points else self.side_of_sum(plane, (point,))
+        if point in plane.points:
+            return 0
+        value = sum(map(mul, plane.normal, self._integers[point])) - plane.offset
+        error = self._error
+        if value > error:
+            return 1
+        if value < -error:
+            return -1
+        return self.value(plane, point).sign() if error else 0
 
     def side_of_sum(self, plane: Hyperplane, points: Sequence[int]) -> int:
         """Return on which side the barycentre of some points lies: -1, 0 or 1."""

@@ -156,7 +156,10 @@ class _Check:
     def flatness(self) -> None:
         """Refuse simplices without volume."""
         for number, simplex in enumerate(self.simplices):
-            volume = self.points.volume(simplex)
+            facet = simplex[:-1]
+            if facet not in self.planes:
+                self.planes[facet] = self.points.hyperplane(facet)
+            volume = abs(self.points.value(self.planes[facet], simplex[-1]))
             if not volume:
                 raise VerificationError(
                     f"simplex {number}, {list(simplex)}, is flat: "
@@ -169,7 +172,9 @@ class _Check:
         overlaps: list[str] = []
         lonely: list[str] = []
         for facet, opposite in self._opposite_vertices().items():
-            plane = self.planes[facet] = self.points.hyperplane(facet)
+            if facet not in self.planes:
+                self.planes[facet] = self.points.hyperplane(facet)
+            plane = self.planes[facet]
             by_side: dict[int, list[int]] = {}
             for vertex in opposite:
                 by_side.setdefault(self.points.side(plane, vertex), []).append(vertex)
