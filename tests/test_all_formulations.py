@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
@@ -284,6 +285,38 @@ def test_tiny_simplices_are_not_left_out(name: str) -> None:
     root = root_bound(part, costs_of(part, costs[cheap]))
     assert root.status == "integral"
     assert root.lp == pytest.approx(103)
+
+
+@pytest.mark.parametrize("name", ["0", "1"])
+def test_volumes_far_below_tolerances_mislead_no_solver(name: str, tmp_path: Path) -> None:
+    """Shares of the hull between 10^-12 and 1: SCIP's own cuts from such rows cut off all optima."""
+    points = [
+        [2 * 10**9, 10**20, 2],
+        [0, 0, 2 * 10**20],
+        [0, 2, 0],
+        [0, 2 * 10**20, 10**9],
+        [1, 0, 10**20],
+        [10**9, 10**20, 10**9],
+    ]
+    table: list[Any] = [[[0, 1, 3, 5], -4], [[0, 2, 4, 5], -1]]
+    table += [[simplex, 0] for simplex in ([1, 2, 3, 4], [1, 2, 3, 5], [1, 2, 4, 5], [2, 3, 4, 5])]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"default": -5, "costs": table}))
+    asked: dict[str, Any] = {"objective": f"costs:{file}", "sense": "max", "spanning": True, "separators": []}
+    for method in ("scip", "listing"):
+        result = bcut.solve(points, formulation=name, method=method, **asked)
+        assert (result.status, result.value) == ("optimal", -15)
+    assert verify(bcut.solve(points, **asked)).proven_optimal
+
+
+def test_shares_of_the_hull_are_0_or_not_too_small_for_solvers() -> None:
+    configuration = sliver()
+    chirotope = Chirotope.of(configuration)
+    rows = volume_rows(configuration, chirotope, chirotope.bases)
+    lower, upper = (row / 2.0**shift for row, shift in zip(rows.coefficients, rows.shifts, strict=True))
+    assert set(lower[lower < 2.0**-28]) == {0.0}
+    assert upper.min() == 2.0**-28
+    assert (lower <= upper).all()
 
 
 def test_the_oracles_are_exact_at_0_1_points() -> None:

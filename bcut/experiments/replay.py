@@ -84,11 +84,12 @@ def replay(ledger: Ledger) -> Replay:
                 f"{ledger.label}: speaks of {json.dumps(strange)}, which is no candidate simplex of its points"
             ) from None
 
-    rows = [
-        IntegerCut(cut["family"], columns(cut["simplices"]), np.array(cut["coefficients"]), cut["rhs"], {})
-        for cut in ledger.cuts
-        if cut["final"]
-    ]
+    rows: list[IntegerCut] = []
+    for cut in ledger.cuts:
+        if cut["final"]:
+            _check_form(cut, configuration.n, configuration.dimension, ledger.label)
+            coefficients = np.array(cut["coefficients"])
+            rows.append(IntegerCut(cut["family"], columns(cut["simplices"]), coefficients, cut["rhs"], {}))
     # A column that SCIP fixed at 1 is one more row.
     rows += [IntegerCut("fixed", columns([simplex]), np.array([-1]), -1, {}) for simplex in end["at_one"]]
     relaxation.add(rows)
@@ -210,15 +211,26 @@ def check_ledger(ledger: Ledger) -> CutChecks:
 
 
 def _certificate_cut(entry: Mapping[str, Any], points: ExactPoints, label: str) -> CertificateCut:
+    _check_form(entry, points.n, points.dimension, label)
+    return CertificateCut(
+        entry["family"],
+        tuple(tuple(simplex) for simplex in entry["simplices"]),
+        tuple(Fraction(value) for value in entry["coefficients"]),
+        Fraction(entry["rhs"]),
+        Fraction(0),
+        entry["proof"],
+    )
+
+
+def _check_form(entry: Mapping[str, Any], n: int, dimension: int, label: str) -> None:
+    """Refuse an entry that is no cut for n points."""
     simplices, coefficients, rhs = entry["simplices"], entry["coefficients"], entry["rhs"]
     wrong = ""
     if not simplices:
         wrong = "it has no simplices"
-    elif not all(_is_simplex(simplex, points) for simplex in simplices):
-        strange = next(simplex for simplex in simplices if not _is_simplex(simplex, points))
-        wrong = (
-            f"{json.dumps(strange)} is no list of {points.dimension + 1} ascending points below {points.n}"
-        )
+    elif not all(_is_simplex(simplex, n, dimension) for simplex in simplices):
+        strange = next(simplex for simplex in simplices if not _is_simplex(simplex, n, dimension))
+        wrong = f"{json.dumps(strange)} is no list of {dimension + 1} ascending points below {n}"
     elif len({tuple(simplex) for simplex in simplices}) != len(simplices):
         wrong = "it has the same simplex twice"
     elif len(coefficients) != len(simplices):
@@ -229,20 +241,12 @@ def _certificate_cut(entry: Mapping[str, Any], points: ExactPoints, label: str) 
         wrong = f"its right-hand side is {rhs!r}, where an integer belongs"
     if wrong:
         raise LedgerError(f"{label}: cut {entry['number']} is malformed: {wrong}")
-    return CertificateCut(
-        entry["family"],
-        tuple(tuple(simplex) for simplex in simplices),
-        tuple(Fraction(value) for value in coefficients),
-        Fraction(rhs),
-        Fraction(0),
-        entry["proof"],
-    )
 
 
-def _is_simplex(value: Any, points: ExactPoints) -> bool:
+def _is_simplex(value: Any, n: int, dimension: int) -> bool:
     return (
         isinstance(value, list)
-        and len(value) == points.dimension + 1
-        and all(type(vertex) is int and 0 <= vertex < points.n for vertex in value)
+        and len(value) == dimension + 1
+        and all(type(vertex) is int and 0 <= vertex < n for vertex in value)
         and sorted(set(value)) == value
     )

@@ -12,7 +12,8 @@ So the row is written with its coefficients rounded to multiples of 2**-40 of th
 
     sum of floor(2**40 v_t / V) x_t  <=  2**40  <=  sum of ceil(2**40 v_t / V) x_t,
 
-which every x >= 0 with the exact row satisfies: a relaxation, and a very close one. At 0/1 points the rows of
+which every x >= 0 with the exact row satisfies: a relaxation, and a very close one. Shares below 2**-28 become 0 and
+2**-28, for SCIP makes wrong cuts of coefficients near its tolerance of 10**-9. At 0/1 points the rows of
 `bcut.formulations.lazy_rows.CoverageRows` see to the rest, exactly.
 """
 
@@ -33,6 +34,8 @@ from bcut.geometry.volumes import hull_volume, volumes
 # Up to this volume of the hull, in units of the common divisor, a solver's tolerance of 1e-6 is less than a unit.
 _LARGEST_EXACT = 1 << 16
 _SHIFT = 40
+# The least coefficient other than 0.
+_LEAST = 1 << (_SHIFT - 28)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +111,8 @@ def _shares(
         value, own = _enclosed(part, basis)
         low.append(max(0, ((value - own) << _SHIFT) // (total + error)))
         high.append(-((-(value + own) << _SHIFT) // (total - error)))
-    return np.array(low, dtype=np.int64), np.array(high, dtype=np.int64)
+    lower, upper = np.array(low, dtype=np.int64), np.array(high, dtype=np.int64)
+    return np.where(lower < _LEAST, 0, lower), np.maximum(upper, _LEAST)
 
 
 def _enclosed(coefficients: NDArray[Any], basis: list[int]) -> tuple[int, int]:

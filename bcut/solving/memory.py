@@ -17,8 +17,8 @@ GIB = 1 << 30
 # Whether an interrupt is on its way that comes from this process itself.
 _MEANT = threading.Event()
 
-# Seconds between two looks, and those that a stage has after the deadline to end by itself.
-_PERIOD, _GRACE = 0.05, 1.0
+# Seconds between two looks, those that a stage has after the deadline to end by itself, and those that an import has.
+_PERIOD, _GRACE, _IMPORT = 0.05, 1.0, 10.0
 
 
 @dataclass
@@ -60,13 +60,23 @@ def interrupt() -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
+def _imports(thread: int) -> int:
+    """Return in how many imports, one inside the other, a thread is."""
+    count, frame = 0, sys._current_frames().get(thread)
+    while frame is not None:
+        count += frame.f_code.co_filename == "<frozen importlib._bootstrap>"
+        frame = frame.f_back
+    return count
+
+
 @contextmanager
 def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> Iterator[None]:
     """Interrupt the block, as Ctrl-C would, when the process uses too much memory or has no more time.
 
     Solvers and loops hear an interrupt within a moment and keep what they have found, and so one mechanism serves all
     stages; those that watch the deadline themselves end before this does. An interrupt, also one by Ctrl-C, that
-    arrives where Python cannot raise it, in a callback of compiled code for one, is sent again.
+    arrives where Python cannot raise it, in a callback of compiled code for one, is sent again. Limits wait for a
+    library that is being imported: a process can do nothing with what an interrupt leaves of it, and has no other.
 
     Nothing is watched outside the main thread, where interrupts do not arrive.
 
@@ -83,6 +93,13 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
         yield
         return
     ended, unheard = threading.Event(), threading.Event()
+    main = threading.get_ident()
+    before = _imports(main)
+
+    def await_imports() -> None:
+        until = time.monotonic() + _IMPORT
+        while _imports(main) > before and time.monotonic() < until and not ended.wait(_PERIOD):
+            pass
 
     def look() -> None:
         while not ended.wait(_PERIOD):
@@ -96,7 +113,9 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
                 watch.reached = "time"
             else:
                 continue
-            interrupt()
+            await_imports()
+            if not ended.is_set():
+                interrupt()
 
     def heed(*_: object) -> None:
         if _MEANT.is_set():

@@ -161,7 +161,11 @@ def _finish(search: Search, status: str) -> None:
     if status == "optimal":
         if not is_resolved(search.whole.objective, search.value):
             # What SCIP's bound says within its tolerance is all there is.
-            search.status = "optimal" if _is_close(search) else "limit"
+            value, bound = search.value, search.bound
+            reached = (
+                value is not None and bound is not None and search.sign * value <= search.rounded_up(bound)
+            )
+            search.status = "optimal" if reached or _is_close(search) else "limit"
             return
         search.status = "optimal"
         # SCIP stops at its own tolerance; its bound is the value then.
