@@ -54,6 +54,20 @@ name = "link"
 separators = ["link"]
 """
 
+# Asks for more memory than it may have.
+GREEDY = """
+import numpy as np
+from bcut import Separator
+
+class Greedy(Separator):
+    \"\"\"Has a large table.\"\"\"
+    name = "greedy"
+
+    def separate(self, point):
+        np.empty(1 << 32, dtype=np.uint8)
+        return []
+"""
+
 # The run of this separator is killed from outside, as by a kernel that is out of memory.
 KILLED = """
 import os, signal
@@ -441,10 +455,13 @@ def test_orbits_bound_symmetric_instances(tmp_path: Path) -> None:
 
 
 def test_memory_is_limited_for_each_run(tmp_path: Path) -> None:
-    plan = read_plan(plan_file(tmp_path, ONE))
-    small = replace(plan.variants[0], memory_limit=0.25)
-    progress = run_experiment(replace(plan, variants=(small,)), tmp_path / "out")
-    assert (progress.done, len(progress.failures)) == (0, 1)
+    (tmp_path / "greedy.py").write_text(GREEDY)
+    plan = read_plan(plan_file(tmp_path, ONE.replace('"link"]', '"./greedy.py"]')))
+    for limit, ended in ((None, (1, 0)), (2.0, (0, 1))):
+        limited = replace(plan, variants=(replace(plan.variants[0], memory_limit=limit),))
+        progress = run_experiment(limited, tmp_path / f"out-{limit}")
+        assert (progress.done, len(progress.failures)) == ended
+    assert "MemoryError" in progress.failures[0][2]
 
 
 SLEEPING = """
