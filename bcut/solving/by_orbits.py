@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bcut.bounds.averaged import AveragedPart
-from bcut.bounds.orbit_root import orbit_root
 from bcut.errors import TooLargeError
 from bcut.formulations.partial_cocircuits import partial_cocircuit_formulation
 from bcut.geometry.chirotope import Chirotope
@@ -26,11 +25,11 @@ from bcut.geometry.placing import placing_triangulation
 from bcut.objectives.objective import make_objective
 from bcut.result import Certificate
 from bcut.separation.driver import FamilyStatistics
-from bcut.solving.capping import are_too_different, limit_of_costs, limited
+from bcut.solving.capping import capped_stage
 from bcut.solving.certificates import case_data, make_orbit_certificate
 from bcut.solving.invariant_search import PASSES, find_invariant_triangulation
 from bcut.solving.orbit_branching import branch_over_faces
-from bcut.solving.orbit_stage import MAX_COLUMNS, OrbitStage
+from bcut.solving.orbit_stage import OrbitStage
 from bcut.solving.report import settles
 from bcut.solving.search import Part, Search, branch
 from bcut.solving.strategies import is_optimal, is_resolved
@@ -135,7 +134,7 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
     best = _Best(search.whole, search.columns)
     search.offer(search.whole.columns)
     best.keep(search)
-    stage = _capped(search, stage)
+    stage = capped_stage(search, stage)
     best.keep(search)
     stage = bound_by_orbits(search, stage, cuts=cuts)
     if search.bound is None:
@@ -182,23 +181,6 @@ def _within_tolerance(search: Search) -> None:
     value = search.sign * search.value
     if value < search.bound <= value + max(Fraction(search.whole.objective.largest_cost), abs(value)) / 10**6:
         search.bound = value
-
-
-def _capped(search: Search, stage: OrbitStage) -> OrbitStage:
-    """Return the stage with costs that solvers can compare, where they are too different and all can be listed."""
-    if stage.root.bound is None or not are_too_different(stage.objective):
-        return stage
-    everything = stage.target_for(MAX_COLUMNS)
-    if stage.columns_within(everything) < stage.formulation.sizes.sum():
-        return stage
-    formulation, costs = stage.residual(everything)
-    search.whole, search.columns = Part.whole(formulation, costs), None
-    limit = limit_of_costs(search)
-    if limit is None:
-        return stage
-    objective = limited(stage.objective, limit)
-    root = orbit_root(stage.formulation, objective, method="interior", seconds=search.seconds_left)
-    return stage if root.bound is None else replace(stage, objective=objective, root=root)
 
 
 class _Best:

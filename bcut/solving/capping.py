@@ -18,8 +18,10 @@ from math import frexp
 
 import numpy as np
 
+from bcut.bounds.orbit_root import orbit_root
 from bcut.objectives.objective import Bottleneck, Objective
 from bcut.solving.bottleneck import without_bad_simplices
+from bcut.solving.orbit_stage import MAX_COLUMNS, OrbitStage
 from bcut.solving.search import Part, Search
 
 # Costs that are no larger than so many times nearly all of them do no harm.
@@ -30,16 +32,33 @@ _SPREAD, _NEARLY_ALL = 1000.0, 0.02
 def capped_costs(search: Search) -> Iterator[None]:
     """Cap the costs of a search within the block, where they are too different for solvers."""
     whole = search.whole
-    limit = limit_of_costs(search)
+    limit = _limit_of_costs(search)
     if limit is not None:
-        search.whole = Part(whole.formulation, limited(whole.objective, limit), whole.columns)
+        search.whole = Part(whole.formulation, _limited(whole.objective, limit), whole.columns)
     try:
         yield
     finally:
         search.whole = whole
 
 
-def limit_of_costs(search: Search) -> Fraction | None:
+def capped_stage(search: Search, stage: OrbitStage) -> OrbitStage:
+    """Return the stage with costs that solvers can compare, where they are too different and all can be listed."""
+    if stage.root.bound is None or not _are_too_different(stage.objective):
+        return stage
+    everything = stage.target_for(MAX_COLUMNS)
+    if stage.columns_within(everything) < stage.formulation.sizes.sum():
+        return stage
+    formulation, costs = stage.residual(everything)
+    search.whole, search.columns = Part.whole(formulation, costs), None
+    limit = _limit_of_costs(search)
+    if limit is None:
+        return stage
+    objective = _limited(stage.objective, limit)
+    root = orbit_root(stage.formulation, objective, method="interior", seconds=search.seconds_left)
+    return stage if root.bound is None else replace(stage, objective=objective, root=root)
+
+
+def _limit_of_costs(search: Search) -> Fraction | None:
     """Return the cost beyond which no simplex is in a better triangulation than one that the search now has.
 
     Returns
@@ -48,7 +67,7 @@ def limit_of_costs(search: Search) -> Fraction | None:
         A cap, with the sign of the costs; None where their sizes do no harm, or no triangulation is found.
     """
     objective = search.whole.objective
-    if not are_too_different(objective):
+    if not _are_too_different(objective):
         return None
     worst = Bottleneck(objective.name, objective.sense, objective.numerators, objective.denominator)
     found = without_bad_simplices(
@@ -71,7 +90,7 @@ def limit_of_costs(search: Search) -> Fraction | None:
     return objective.sign * Fraction(min(cap, objective.largest_cost))
 
 
-def are_too_different(objective: Objective) -> bool:
+def _are_too_different(objective: Objective) -> bool:
     """Tell whether some costs are so large that a cap may be needed, and that there may be one."""
     signed = objective.sign * objective.costs
     if objective.counts_units or not len(signed):
@@ -85,7 +104,7 @@ def _gained(objective: Objective) -> float:
     return float(np.abs(np.minimum(objective.sign * objective.costs, 0)).sum())
 
 
-def limited(objective: Objective, limit: Fraction) -> Objective:
+def _limited(objective: Objective, limit: Fraction) -> Objective:
     """Return an objective without costs beyond a limit."""
     lower = np.minimum if objective.sign > 0 else np.maximum
     bound = float(limit) if objective.are_doubles else int(limit * objective.denominator)
