@@ -51,6 +51,8 @@ class RootLimits:
     target : Fraction, optional
         Only solutions with ``sign * objective <= target`` matter: columns that no such solution can use leave
         the relaxation, and the loop stops as soon as the bound is proven to exceed it.
+    goal : Fraction, optional
+        The loop stops as soon as the bound is proven to reach this, as good a bound as is of use.
     """
 
     rounds: int = 1000
@@ -58,6 +60,12 @@ class RootLimits:
     stall: float = 1e-6
     deadline: float | None = None
     target: Fraction | None = None
+    goal: Fraction | None = None
+
+    def are_met_by(self, bound: Fraction) -> bool:
+        """Tell whether a better bound would be of no use."""
+        beyond = self.target is not None and bound > self.target
+        return beyond or (self.goal is not None and bound >= self.goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +97,8 @@ class RootBound:
     ----------
     status : {"integral", "dry", "stalled", "limit", "target", "infeasible", "interrupted"}
         Why it ended: an integral point, no more violated cuts, no progress, a limit, a bound beyond the
-        target, or no point at all. "interrupted" stands for what is known at a relaxation while the loop goes on, and
-        remains should anything interrupt it.
+        target or at the goal, or no point at all. "interrupted" stands for what is known at a relaxation while the
+        loop goes on, and remains should anything interrupt it.
     lp, lp_after_cuts : float or None
         LP values before and after cuts, unrounded; None where none was found in time.
     rounds : list of Round
@@ -217,7 +225,7 @@ class _Loop:
         result, limits = self.result, self.limits
         if np.minimum(point.x, 1 - point.x).max(initial=0.0) <= 1e-6:
             result.status = "integral"
-        elif limits.target is not None and result.last is not None and result.last.value > limits.target:
+        elif result.last is not None and limits.are_met_by(result.last.value):
             result.status = "target"
         elif self.stalled >= limits.stall_rounds:
             result.status = "stalled"

@@ -190,13 +190,18 @@ def place(search: Search) -> None:
 
 
 def bound_at_root(
-    search: Search, part: Part, separation: Separation | None, *, target: Fraction | None = None
+    search: Search,
+    part: Part,
+    separation: Separation | None,
+    *,
+    target: Fraction | None = None,
+    goal: Fraction | None = None,
 ) -> RootBound:
     """Run the cutting-plane loop on a part; keep an integral point as a triangulation.
 
-    Without a deadline the loop ends by itself. With a `target` it ends as soon as the bound exceeds it. What
-    relaxations of the whole prove is kept at once, as ``search.exact`` and in the bound: it stands however the loop
-    ends.
+    Without a deadline the loop ends by itself. With a `target` it ends as soon as the bound exceeds it, with a
+    `goal` as soon as the bound reaches that. What relaxations of the whole prove is kept at once, as
+    ``search.exact`` and in the bound: it stands however the loop ends.
     """
 
     def on_round(finished: Round) -> None:
@@ -216,7 +221,7 @@ def bound_at_root(
         if known.last is not None:
             search.raise_bound(known.last.value)
 
-    limits = RootLimits(deadline=search.deadline, target=target)
+    limits = RootLimits(deadline=search.deadline, target=target, goal=goal)
     with search.timed("root"):
         root = root_bound(
             part.formulation,

@@ -113,16 +113,19 @@ def _reach(
 
 def solve_at_once(search: Search) -> None:
     """Cut the relaxation of all columns, then hand it to SCIP with its cuts: any objective."""
-    root = bound_at_root(search, search.whole, search.separation(search.whole))
+    place(search)
+    goal = None
+    if search.value is not None:
+        goal = search.sign * search.value - Fraction(_accuracy(search, search.value))
+    root = bound_at_root(search, search.whole, search.separation(search.whole), goal=goal)
     if root.status == "infeasible" or root.first is None:
         _note_infeasible(search, root)
         return
-    if root.status == "integral" and _is_close(search):
+    if _is_close(search):
         search.status = "optimal"
         return
     if search.seconds_left == 0.0:
         return
-    place(search)
     _finish(search, branch(search, search.whole, root))
 
 
@@ -141,10 +144,14 @@ def _is_close(search: Search) -> bool:
     value, bound = search.value, search.bound
     if value is None or bound is None:
         return False
+    return float(search.sign * value - bound) <= _accuracy(search, value)
+
+
+def _accuracy(search: Search, value: Fraction) -> float:
+    """Return by how much an optimal value may differ from its bound."""
     # No more than the gap that verification accepts, which is relative to the value, or to 1 where that is smaller.
     size = abs(float(value))
-    size = min(max(search.whole.objective.largest_cost, size), max(1.0, size))
-    return float(search.sign * value - bound) <= RELATIVE_GAP * size
+    return RELATIVE_GAP * min(max(search.whole.objective.largest_cost, size), max(1.0, size))
 
 
 def is_resolved(objective: Objective, value: Fraction | None) -> bool:
