@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,13 @@ def incidence(formulation: Formulation) -> np.ndarray:
     for row, columns in enumerate(found):
         table[row, list(columns)] = 1
     return table
+
+
+@cache
+def listed(instance: str, spanning: bool) -> tuple[Formulation, list[tuple[int, ...]]]:
+    """A program and all its triangulations."""
+    formulation = cocircuit_formulation(load_instance(instance), spanning=spanning)
+    return formulation, list(triangulations(formulation.chirotope, spanning=spanning))
 
 
 class HullCuts(Separator):

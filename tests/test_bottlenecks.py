@@ -1,13 +1,10 @@
-"""Bottlenecks and lexicographic combinations: brute force, known optima, proofs, and proofs that were tampered with."""
+"""Bottlenecks and lexicographic combinations: known optima, fractional relaxations, restrictions and limits."""
 
 from __future__ import annotations
 
-import copy
 import json
 import math
-from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,145 +12,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import listed
 from scipy.spatial import Delaunay
 
 import bcut
 import bcut.instances
 from bcut.cli.main import run
-from bcut.errors import InputError, ResultError, VerificationError
-from bcut.formulations.cocircuits import cocircuit_formulation
+from bcut.errors import InputError
 from bcut.formulations.formulation import Formulation
 from bcut.geometry.configuration import PointConfiguration
-from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.objectives.measures import measured
 from bcut.objectives.objective import Bottleneck, Objective, make_objective
-from bcut.objectives.syntax import read_level
 from bcut.result import Result
 from bcut.solving.bottleneck import threshold_certificate
 from bcut.verification.verify import verify
 
-# Every triangulation of these is listed.
-SMALL = [
-    ("random:9,2,seed=1", True),
-    ("random:8,2,seed=2", False),
-    ("random:8,3,seed=1", True),
-    ("random:8,3,seed=4", False),
-    ("random:7,3,seed=2", False),
-    ("random:7,4,seed=1", True),
-    ("random:7,4,seed=3", False),
-    ("grid:3,3", True),
-    ("moae", False),
-    ("prism:3", False),
-    ("cube:3", False),
-    ("polygon:6,center", False),
-]
-MEASURES = [
-    "weight",
-    "volume",
-    "aspect-ratio",
-    "dihedral-angle",
-    "min-angle",
-    "solid-angle",
-    "random-costs:1",
-]
-OBJECTIVES = [f"{kind}{measure}" for kind in ("", "min-max:", "max-min:") for measure in MEASURES]
-COMBINATIONS = [
-    ["max-min:dihedral-angle", "cardinality"],
-    ["max-min:dihedral-angle", "max:cardinality", "max:weight"],
-    ["min-max:aspect-ratio", "weight"],
-    ["min-max:weight", "max-min:volume", "min-max:random-costs:2"],
-    ["cardinality", "max-min:dihedral-angle"],
-    ["cardinality", "max:weight"],
-    ["max:cardinality", "min-max:aspect-ratio", "random-costs:3"],
-]
 PENTAGON = f"costs:{bcut.instances.path('pentagon-center-costs')}"
-
-
-def fits(objective: str, dimension: int) -> bool:
-    if "min-angle" in objective.replace("max-min:", ""):
-        return dimension == 2
-    return "solid-angle" not in objective or dimension == 3
-
-
-@cache
-def listed(instance: str, spanning: bool) -> tuple[Formulation, list[tuple[int, ...]]]:
-    formulation = cocircuit_formulation(load_instance(instance), spanning=spanning)
-    return formulation, list(triangulations(formulation.chirotope, spanning=spanning))
-
-
-def best_of(instance: str, spanning: bool, objectives: Sequence[str]) -> list[Fraction]:
-    """The values of a best triangulation, found by looking at all of them."""
-    formulation, left = listed(instance, spanning)
-    values = []
-    for text in objectives:
-        name = read_level(text)
-        objective = make_objective(name.text, formulation, sense=name.sense)
-        costs = objective.exact_costs(range(len(formulation.simplices)))
-        if not name.is_bottleneck:
-            found = [sum((costs[t] for t in chosen), Fraction(0)) for chosen in left]
-        else:
-            worst = max if name.sense == "min" else min
-            found = [worst(costs[t] for t in chosen) for chosen in left]
-        values.append(min(found) if name.sense == "min" else max(found))
-        left = [chosen for chosen, value in zip(left, found, strict=True) if value == values[-1]]
-    return values
-
-
-def assert_close(found: Any, exact: Fraction, *, is_bottleneck: bool) -> None:
-    if is_bottleneck:
-        assert found == float(exact)
-    else:
-        assert found == pytest.approx(float(exact), rel=1e-9)
-
-
-@pytest.mark.parametrize(("instance", "spanning"), SMALL)
-def test_brute_force_agrees_with_every_objective(instance: str, spanning: bool) -> None:
-    formulation, _ = listed(instance, spanning)
-    for objective in filter(lambda text: fits(text, formulation.configuration.dimension), OBJECTIVES):
-        is_bottleneck = objective[:3] in ("min", "max") and ":" in objective
-        for sense in (None,) if is_bottleneck else ("min", "max"):
-            text = objective if sense is None else f"{sense}:{objective}"
-            (expected,) = best_of(instance, spanning, [text])
-            result = bcut.solve(
-                formulation.configuration, objective=objective, sense=sense, spanning=spanning
-            )
-            assert result.status == "optimal", text
-            assert_close(result.value, expected, is_bottleneck=is_bottleneck)
-            checked = verify(result)
-            assert checked.value is not None
-            assert_close(float(checked.value), expected, is_bottleneck=is_bottleneck)
-            if is_bottleneck:
-                assert result.bound == result.value
-
-
-@pytest.mark.parametrize(("instance", "spanning"), SMALL)
-def test_brute_force_agrees_with_combinations(instance: str, spanning: bool) -> None:
-    formulation, _ = listed(instance, spanning)
-    for first, *further in COMBINATIONS:
-        name = read_level(first)
-        expected = best_of(instance, spanning, [first, *further])
-        result = bcut.solve(
-            formulation.configuration,
-            objective=name.text,
-            sense=name.sense,
-            then=further,
-            spanning=spanning,
-        )
-        assert result.status == "optimal", further
-        assert [level.status for level in result.then] == ["optimal"] * len(further)
-        assert_close(result.value, expected[0], is_bottleneck=name.is_bottleneck)
-        checked = verify(result)
-        for text, level, proof, value in zip(
-            further, result.then, checked.further, expected[1:], strict=True
-        ):
-            bottleneck = read_level(text).is_bottleneck
-            assert_close(level.value, value, is_bottleneck=bottleneck)
-            assert proof.value is not None
-            assert_close(float(proof.value), value, is_bottleneck=bottleneck)
-
-
-# Larger ones, whose optima are known for other reasons.
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
@@ -242,6 +117,16 @@ def test_many_ranks_above_a_fractional_relaxation(tmp_path: Path) -> None:
         result = bcut.solve("pentagon-center", objective=f"min-max:costs:{path}", separators=[])
         assert (result.status, result.value, result.bound) == ("optimal", expected, expected)
         assert verify(result).value == expected
+
+
+def test_a_threshold_that_is_not_proven_is_not_written() -> None:
+    formulation, _ = listed("pentagon-center", False)
+    objective = make_objective(f"min-max:{PENTAGON}", formulation)
+    assert isinstance(objective, Bottleneck)
+    assert threshold_certificate(formulation, objective, 0).threshold == "0"
+    refused = threshold_certificate(formulation, objective, 1)
+    assert (refused.bound, refused.threshold) == (None, None)
+    assert refused.reason
 
 
 @pytest.mark.parametrize("formulation", ["0", "1", "chambers"])
@@ -361,133 +246,6 @@ def test_relabelled_and_similar_points_have_the_same_optima(
         old, new = (bcut.solve(points, objective=objective).value for points in (before, after))
         assert old is not None
         assert new == pytest.approx(old * float(factor) ** degree, rel=1e-8)
-
-
-# Thresholds that were tampered with.
-
-
-def solved(objective: str = "max-min:min-angle", **options: Any) -> dict[str, Any]:
-    data = bcut.solve("random:8,2,seed=2", objective=objective, **options).to_dict()
-    assert verify(data).exact_bound is not None
-    return copy.deepcopy(data)
-
-
-@pytest.mark.parametrize("objective", ["max-min:min-angle", "min-max:aspect-ratio"])
-def test_a_better_threshold_is_refused(objective: str) -> None:
-    data = solved(objective)
-    threshold = Fraction(data["certificate"]["threshold"])
-    factor = Fraction(99, 100) if objective.startswith("max-min") else Fraction(101, 100)
-    data["certificate"]["threshold"] = str(threshold * factor)
-    with pytest.raises(VerificationError, match=r"claims the bound .* but its multipliers prove"):
-        verify(data)
-    data["certificate"]["bound"] = "-1000"
-    with pytest.raises(VerificationError, match="which must be positive to prove anything"):
-        verify(data)
-
-
-def test_a_worse_threshold_proves_less() -> None:
-    data = solved()
-    threshold = Fraction(data["certificate"]["threshold"])
-    data["certificate"]["threshold"] = str(threshold * Fraction(101, 100))
-    checked = verify(data)
-    assert not checked.proven_optimal
-    assert checked.statement.endswith("optimality rests on the solver's tree")
-
-
-def test_every_multiplier_of_a_threshold_counts() -> None:
-    data = solved()
-    for number in range(len(data["certificate"]["multipliers"])):
-        changed = copy.deepcopy(data)
-        row = changed["certificate"]["multipliers"][number]
-        row[1] = str(-Fraction(row[1]))
-        with pytest.raises(VerificationError, match="multipliers prove"):
-            verify(changed)
-
-
-@pytest.mark.parametrize(
-    ("path", "entry", "message"),
-    [
-        ("certificate.threshold", None, "is a bottleneck, and has no threshold"),
-        ("problem.objective", "min-angle", "is a sum, and has a threshold|claims the value"),
-        ("problem.objective", "min-max:min-angle", "contradict each other"),
-        ("problem.sense", "min", "contradict each other"),
-        ("value", 0.25, "claims the value 1/4, but its triangulation has"),
-        ("certificate.threshold", "x", "this is a rational as text"),
-        ("certificate.earlier", ["0"], "has 1 multipliers of earlier objectives, but there are 0"),
-        ("certificate.symmetries", [[0, 1, 2, 3, 4, 5, 6, 7]], "one over orbits|multipliers"),
-    ],
-)
-def test_results_of_bottlenecks_that_were_changed(path: str, entry: Any, message: str) -> None:
-    data = solved()
-    *folders, last = path.split(".")
-    target = data
-    for folder in folders:
-        target = target[folder]
-    target[last] = entry
-    with pytest.raises((VerificationError, ResultError), match=message):
-        verify(data)
-
-
-def combined() -> dict[str, Any]:
-    return solved("cardinality", spanning=True, then=["max-min:min-angle", "weight"])
-
-
-@pytest.mark.parametrize(
-    ("path", "entry", "message"),
-    [
-        ("then.0.value", 0.5, r"then\[0\] \(max-min:min-angle\): it claims the value 1/2, but"),
-        ("then.1.value", None, r"then\[1\] \(weight\): it claims no value"),
-        ("then.1.bound", 100.0, r"then\[1\] \(weight\): its value .* is better than its bound"),
-        ("then.0.status", "limit", r"its status is 'optimal', but that of then\[0\] is 'limit'"),
-        ("then.0.status", None, r"its status is 'optimal', but then\[0\] was not begun"),
-        ("then.0.certificate.earlier", ["1"], "which must be zero or negative"),
-        ("then.1.certificate.earlier", ["0", "-1"], "which must be zero"),
-        ("then.1.certificate.earlier", ["-1000", "0"], "claims the bound .* but its multipliers prove"),
-        ("then.1.certificate.earlier", ["0"], "1 multipliers of earlier objectives, but there are 2"),
-        ("then.0.certificate.threshold", "1/100", "must be positive|multipliers prove"),
-        ("then.0.certificate.multipliers.0.1", "x", r"'then\[0\]\.certificate\.multipliers\[0\]'"),
-        ("then", [], r"'then': this is a list of 2, one entry for each of problem\.then"),
-        ("then.0", 3, r"'then\[0\]': this is a JSON object"),
-        ("problem.then.0.sense", "least", r"'problem\.then\[0\]\.sense': this is one of min, max"),
-        ("problem.then.1.sense", "max", "claims the bound|better than|room for a better"),
-        ("problem.then.0.objective", "max-min:beauty", "a measure that this version does not know"),
-    ],
-)
-def test_combinations_that_were_changed(path: str, entry: Any, message: str) -> None:
-    data = combined()
-    *folders, last = [int(part) if part.isdigit() else part for part in path.split(".")]
-    target: Any = data
-    for folder in folders:
-        target = target[folder]
-    target[last] = entry
-    with pytest.raises((VerificationError, ResultError), match=message):
-        verify(data)
-
-
-def test_a_combination_is_only_as_optimal_as_its_last_objective() -> None:
-    data = solved("cardinality", spanning=True, then=["max-min:min-angle"])
-    assert verify(data).proven_optimal
-    assert verify(data).statement == (
-        f"by cardinality: optimal, proven exactly: the triangulation is verified, and its value "
-        f"{data['value']} meets the bound {data['value']}. then by max-min:min-angle: optimal, proven exactly: "
-        f"the triangulation is verified, and its value {data['then'][0]['value']:.10g} meets the bound "
-        f"{data['then'][0]['value']:.10g}"
-    )
-    data["then"][0]["certificate"] = None
-    checked = verify(data)
-    assert not checked.proven_optimal
-    assert checked.further[0].exact_bound is None
-    assert "optimality rests on the run itself" in checked.statement
-
-
-def test_a_threshold_that_is_not_proven_is_not_written() -> None:
-    formulation, _ = listed("pentagon-center", False)
-    objective = make_objective(f"min-max:{PENTAGON}", formulation)
-    assert isinstance(objective, Bottleneck)
-    assert threshold_certificate(formulation, objective, 0).threshold == "0"
-    refused = threshold_certificate(formulation, objective, 1)
-    assert (refused.bound, refused.threshold) == (None, None)
-    assert refused.reason
 
 
 # The command line.

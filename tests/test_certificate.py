@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
-from itertools import combinations
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import listed
+from square import square_result
 
 from bcut.bounds.root import root_bound
 from bcut.errors import ResultError, VerificationError
 from bcut.formulations.cocircuits import cocircuit_formulation
-from bcut.formulations.formulation import Formulation
-from bcut.geometry.chirotope import Chirotope
-from bcut.geometry.configuration import PointConfiguration
-from bcut.geometry.crossings import crossing_matrix
 from bcut.geometry.triangulations import triangulations
 from bcut.instance import load_instance
 from bcut.objectives.objective import make_objective
@@ -28,45 +21,8 @@ from bcut.solving.certificates import make_certificate
 from bcut.verification.certificate import certified_bound
 from bcut.verification.certificate_data import CertificateData
 from bcut.verification.costs import Costs
-from bcut.verification.cuts import CUT_CHECKERS, CertificateCut, UncheckedError, check_clique, cross
-from bcut.verification.exact_points import ExactPoints, SideTable
+from bcut.verification.exact_points import ExactPoints
 from bcut.verification.verify import verify
-
-# 2---3
-# |   |
-# 0---1
-SQUARE = [[0, 0], [1, 0], [0, 1], [1, 1]]
-
-# By hand: with y = 2 on the coverage row, 1 on the diagonal 0-3 and -1 on 1-2 all reduced costs are zero.
-# The generic point of the flag lies in 012 and 013. Point 1 is on the - side of 03, 0 on the + side of 12.
-CERTIFICATE = {
-    "bound": "2",
-    "flag": [0, 1, 2],
-    "multipliers": [["coverage", "2"], [[0, 3], "1"], [[1, 2], "-1"]],
-    "cuts": [],
-    "reason": None,
-}
-
-
-def square_result(**changes: Any) -> dict[str, Any]:
-    """The optimal result for the square with its certificate; changes go to the certificate."""
-    configuration = PointConfiguration.from_values(SQUARE)
-    return {
-        "schema": 1,
-        "instance": {
-            "name": "square",
-            "dimension": 2,
-            "points": [list(point) for point in configuration.exact_points()],
-            "digest": configuration.digest,
-        },
-        "problem": {"objective": "cardinality", "sense": "min", "spanning": False},
-        "status": "optimal",
-        "value": 2,
-        "bound": 2,
-        "gap": 0,
-        "triangulation": [[0, 1, 2], [1, 2, 3]],
-        "certificate": {**copy.deepcopy(CERTIFICATE), **changes},
-    }
 
 
 def test_certificate_written_by_hand_proves_optimality() -> None:
@@ -300,13 +256,6 @@ def test_certificates_prove_exactly_what_they_claim(
     assert verification.value == value
 
 
-@cache
-def listed(name: str, spanning: bool) -> tuple[Formulation, list[tuple[int, ...]]]:
-    """A program and all its triangulations."""
-    formulation = cocircuit_formulation(load_instance(name), spanning=spanning)
-    return formulation, list(triangulations(formulation.chirotope, spanning=spanning))
-
-
 RATIONALS = st.fractions(min_value=-4, max_value=4, max_denominator=6)
 
 
@@ -342,117 +291,3 @@ def test_any_multipliers_give_a_bound_on_every_triangulation(
     simplices = [tuple(simplex) for simplex in formulation.simplices.tolist()]
     values = [sum(costs[simplices[column]] for column in chosen) for chosen in every]
     assert found.bound <= min(values) if sense == "min" else found.bound >= max(values)
-
-
-# Cuts.
-
-
-def clique(simplices: Sequence[Sequence[int]], /, **changes: Any) -> dict[str, Any]:
-    cut = {
-        "family": "clique",
-        "simplices": simplices,
-        "coefficients": [1] * len(simplices),
-        "rhs": 1,
-        "multiplier": "-1",
-        "proof": {},
-    }
-    return {**cut, **changes}
-
-
-def two_overlapping(**certificate: Any) -> dict[str, Any]:
-    """Maximise the number of triangles among 012 and 013, which overlap: at most 1, but 2 without a cut."""
-    data = square_result(multipliers=[], **certificate)
-    costs = {"default": 0, "costs": [[[0, 1, 2], 1], [[0, 1, 3], 1]]}
-    data["problem"] = {"objective": "costs:x", "sense": "max", "spanning": False, "costs": costs}
-    return {**data, "value": 1, "bound": 1}
-
-
-def test_clique_cut_strengthens_the_bound() -> None:
-    assert verify(two_overlapping(bound="2")).exact_bound == 2
-    verification = verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]])]))
-    assert (verification.exact_bound, verification.proven_optimal) == (1, True)
-
-
-@pytest.mark.parametrize(
-    ("cut", "reason"),
-    [
-        (clique([[0, 1, 2], [1, 2, 3]]), r"\[0, 1, 2\] and \[1, 2, 3\] meet in a common face"),
-        (
-            clique([[0, 1, 2], [0, 1, 3]], coefficients=[1, 2]),
-            "one simplex alone can exceed its right-hand side 1",
-        ),
-        (clique([[0, 1, 2], [0, 1, 3]], rhs=-1), "one simplex alone can exceed"),
-        (clique([[0, 1, 2], [0, 1, 3]], multiplier="1"), "multiplier 1 of a '<=' row must not be positive"),
-        (clique([[0, 1, 2], [0, 1, 4]]), r"\[0, 1, 4\] does not name 3 points"),
-        (clique([[0, 1, 2], [0, 1]]), r"\[0, 1\] does not name 3 points"),
-    ],
-)
-def test_invalid_cuts_are_refused(cut: dict[str, Any], reason: str) -> None:
-    with pytest.raises(VerificationError, match=r"cut 0 of the certificate \(clique\).*" + reason):
-        verify(two_overlapping(bound="1", cuts=[cut]))
-
-
-def test_flat_simplex_in_a_clique_is_refused() -> None:
-    sides = SideTable(ExactPoints([[0, 0], [1, 0], [2, 0], [0, 1]]))
-    cut = CertificateCut("clique", ((0, 1, 2), (0, 1, 3)), (Fraction(1),) * 2, Fraction(1), Fraction(-1), {})
-    with pytest.raises(VerificationError, match=r"\[0, 1, 2\] is flat"):
-        check_clique(sides, cut)
-
-
-def test_cuts_of_unknown_families_are_not_believed() -> None:
-    cut = clique([[0, 1, 2], [1, 2, 3]], family="magic")
-    verification = verify(two_overlapping(bound="1", cuts=[cut]))
-    assert verification.exact_bound is None
-    assert not verification.proven_optimal
-    assert "was not re-checked: it uses cuts that cannot be re-checked (magic)" in verification.statement
-
-
-def test_a_cut_that_takes_too_long_leaves_the_bound_unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
-    def tired(sides: SideTable, cut: CertificateCut) -> Fraction:
-        raise UncheckedError("it takes more than 5 steps")
-
-    monkeypatch.setitem(CUT_CHECKERS, "clique", tired)
-    verification = verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]])]))
-    assert (verification.exact_bound, verification.proven_optimal) == (None, False)
-    assert verification.statement == (
-        "triangulation verified, value 1; the bound of its certificate was not re-checked: "
-        "cut 0 of the certificate (clique): it takes more than 5 steps; optimality rests on the run itself"
-    )
-    # A target beyond the bound that rows alone prove is left open in the same way.
-    data = two_overlapping(bound="2")
-    stage = {"multipliers": [], "cuts": [clique([[0, 1, 2], [0, 1, 3]])]}
-    data["certificate"]["refutes"] = {"target": "2", "stages": [stage]}
-    verification = verify(data)
-    assert verification.exact_bound == 2
-    assert not verification.proven_optimal
-    assert (
-        "bound 2 proven exactly; what its certificate proves beyond that was not re-checked: stage 0 of the "
-        "certificate's refutation of 2: cut 0 of the certificate (clique): it takes more than 5 steps"
-    ) in verification.statement
-
-
-def test_cuts_without_multiplier_do_not_matter() -> None:
-    cut = clique([[0, 1, 2], [1, 2, 3]], family="magic", multiplier="0")
-    assert verify(two_overlapping(bound="2", cuts=[cut])).exact_bound == 2
-
-
-@pytest.mark.parametrize(
-    "changes", [{"coefficients": [1]}, {"simplices": [], "coefficients": []}, {"simplices": [[0, 1, 2]] * 2}]
-)
-def test_malformed_cuts(changes: dict[str, Any]) -> None:
-    with pytest.raises(ResultError, match="different simplices, and a coefficient for each"):
-        verify(two_overlapping(bound="1", cuts=[clique([[0, 1, 2], [0, 1, 3]], **changes)]))
-
-
-@pytest.mark.parametrize("name", ["grid:3,2", "polygon:6", "cube:3", "prism:5", "cross-polytope:4"])
-def test_crossings_agree_with_the_geometry_of_the_model(name: str) -> None:
-    configuration = load_instance(name)
-    chirotope = Chirotope.of(configuration)
-    generator = np.random.default_rng(1)
-    chosen = generator.permutation(len(chirotope.bases))[:40]
-    expected = crossing_matrix(chirotope, chirotope.bases[chosen])
-    sides = SideTable(ExactPoints(configuration.scalars()))
-    simplices = [tuple(simplex) for simplex in chirotope.bases[chosen].tolist()]
-    for i, j in combinations(range(len(simplices)), 2):
-        assert cross(sides, simplices[i], simplices[j]) == expected[i, j]
-    assert not any(cross(sides, simplex, simplex) for simplex in simplices)

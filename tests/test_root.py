@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -147,16 +148,16 @@ def test_a_deadline_that_has_passed() -> None:
     assert (found.lp, found.lp_after_cuts, found.first, found.point) == (None, None, None, None)
 
 
-def test_a_deadline_in_the_middle_keeps_what_was_found() -> None:
+def test_a_deadline_in_the_middle_keeps_what_was_found(time_is_up: Callable[[], None]) -> None:
     formulation, objective, _ = with_gap(5)
 
     def slow(point: Any) -> list[Cut]:
-        time.sleep(0.3)
+        time_is_up()
         return list(cuts.separate(point))
 
     cuts = HullCuts()
     cuts.setup(at_work(formulation, Watching()).problem)
-    limits = RootLimits(deadline=time.monotonic() + 0.2)
+    limits = RootLimits(deadline=time.monotonic() + 900)
     found = root_bound(formulation, objective, at_work(formulation, Scripted(slow)), limits=limits)
     assert found.status == "limit"
     assert found.lp == pytest.approx(7.5)
@@ -171,6 +172,16 @@ def test_no_progress_for_some_rounds_ends_the_loop() -> None:
     found = root_bound(formulation, objective, at_work(formulation, HullCuts()), limits=limits)
     assert found.status == "stalled"
     assert len(found.rounds) == 4
+
+
+@pytest.mark.parametrize(("goal", "is_met"), [("7.4", True), ("7.6", False)])
+def test_a_bound_at_the_goal_ends_the_loop_before_it_is_cut(goal: str, is_met: bool) -> None:
+    formulation, objective, _ = with_gap(5)
+    watching = Watching()
+    limits = RootLimits(goal=Fraction(goal))
+    found = root_bound(formulation, objective, at_work(formulation, watching), limits=limits)
+    assert found.lp == pytest.approx(7.5)
+    assert (found.status, len(watching.points)) == (("target", 0) if is_met else ("dry", 1))
 
 
 def test_separators_that_find_nothing_end_the_loop() -> None:

@@ -1,12 +1,8 @@
-"""From an instance to a verified optimum: known optima, brute force, TOPCOM, and what happens at limits."""
+"""From an instance to a verified optimum: known optima, brute force, and what a result says."""
 
 from __future__ import annotations
 
 import json
-import re
-import shutil
-import subprocess
-from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,21 +11,19 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from oracles import HullCuts, Scripted, Watching, incidence, with_gap
+from oracles import Watching, incidence, with_gap
 from reference import assert_triangulation, configuration_or_none
+from solving import METHODS, assert_solved
 
 import bcut
 import bcut.instances
-from bcut.errors import InputError, SeparatorError, SeparatorLoadError, SolverError
 from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.geometry.chirotope import Chirotope
 from bcut.geometry.configuration import PointConfiguration
 from bcut.geometry.simplices import candidate_simplices
 from bcut.geometry.triangulations import count_by_size, triangulations
 from bcut.instance import load_instance
-from bcut.result import Result
 from bcut.scip import host
-from bcut.separation.seam import Cut, FractionalPoint
 from bcut.solving import strategies
 from bcut.verification.verify import verify
 
@@ -41,21 +35,12 @@ SMALL = [
     for sense in ("min", "max")
     if row[sense] is not None
 ]
-METHODS = ["auto", "scip"]
 
 
 def label(value: Any) -> str:
     if isinstance(value, dict):
         return value["instance"] + (" spanning" if value["spanning"] else "")
     return str(value)
-
-
-def assert_solved(result: Result, value: Any) -> None:
-    assert result.status == "optimal"
-    assert result.value == result.bound == value
-    assert result.gap == 0
-    checked = verify(result)
-    assert checked.value == value
 
 
 @pytest.mark.parametrize(("row", "sense"), SMALL, ids=label)
@@ -242,48 +227,6 @@ def test_targets_grow_until_one_is_reached(monkeypatch: pytest.MonkeyPatch, tmp_
     assert out_of_reach == sorted(set(out_of_reach))
 
 
-# TOPCOM.
-
-
-def homogeneous(configuration: PointConfiguration) -> str:
-    return json.dumps([[*(int(value) for value in point), 1] for point in configuration.scalars()]) + "\n"
-
-
-def topcom(command: str, configuration: PointConfiguration) -> str:
-    return subprocess.run(
-        [command], input=homogeneous(configuration), capture_output=True, text=True, check=True, timeout=60
-    ).stdout
-
-
-def integer_points(number: int, n: int, d: int, most: int) -> PointConfiguration:
-    points = np.random.default_rng(number).integers(0, most, size=(2 * n, d))
-    return PointConfiguration.from_values(
-        np.unique(points, axis=0)[:n].tolist(), name=f"integer points {number}"
-    )
-
-
-TOPCOM_CASES = [(1, 8, 2, 5), (2, 9, 2, 100), (3, 7, 3, 3), (4, 8, 3, 50), (5, 8, 3, 4), (6, 8, 4, 3)]
-
-
-@pytest.mark.skipif(shutil.which("topcom-points2nalltriangs") is None, reason="TOPCOM is not installed")
-@pytest.mark.parametrize("case", TOPCOM_CASES)
-def test_topcom_counts_as_many_triangulations(case: tuple[int, int, int, int]) -> None:
-    configuration = integer_points(*case)
-    chirotope = Chirotope.of(configuration)
-    for command, spanning in (("topcom-points2nalltriangs", False), ("topcom-points2nallfinetriangs", True)):
-        counted = int(topcom(command, configuration).split()[-1])
-        assert sum(count_by_size(chirotope, spanning=spanning).values()) == counted
-
-
-@pytest.mark.skipif(shutil.which("topcom-points2mintriang") is None, reason="TOPCOM is not installed")
-@pytest.mark.parametrize("case", TOPCOM_CASES)
-def test_topcom_finds_the_same_smallest_size(case: tuple[int, int, int, int]) -> None:
-    configuration = integer_points(*case)
-    last = topcom("topcom-points2mintriang", configuration).strip().splitlines()[-1]
-    size = len(re.findall(r"\{[\d,]+\}", last))
-    assert_solved(bcut.solve(configuration), size)
-
-
 # The result.
 
 
@@ -362,125 +305,14 @@ def test_the_same_question_has_the_same_answer() -> None:
     assert [r.lp for r in results[0].root.rounds] == [r.lp for r in results[1].root.rounds]
 
 
-# Limits and failures.
-
-
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("sense", ["min", "max"])
-@pytest.mark.parametrize("objective", ["cardinality", "random-costs:1"])
-def test_no_time_at_all_still_gives_a_triangulation(method: str, sense: str, objective: str) -> None:
-    result = bcut.solve("cuboctahedron", sense=sense, time_limit=0, method=method, objective=objective)
-    assert result.status == "limit"
-    assert result.triangulation is not None
-    assert_triangulation(load_instance("cuboctahedron").scalars(), result.triangulation)
-    assert verify(result).value == pytest.approx(result.value)
-
-
-def test_a_time_limit_keeps_the_triangulation() -> None:
-    result = bcut.solve("dodecahedron", sense="max", time_limit=1.5, method="scip")
-    assert result.status == "limit"
-    assert result.value is not None
-    assert result.bound is None or result.bound >= result.value
-    verify(result)
-
-
-def test_a_time_limit_in_the_root_keeps_the_bound(time_is_up: Callable[[], None]) -> None:
-    def slow(point: FractionalPoint) -> Iterator[Cut]:
-        time_is_up()
-        yield from ()
-
-    result = bcut.solve("random:12,3,seed=1000", spanning=True, separators=[Scripted(slow)], time_limit=900)
-    assert result.status == "limit"
-    assert result.bound == 17
-    assert result.root.lp == pytest.approx(16.5)
-    assert result.value is not None
-    assert result.value >= 17
-    verify(result)
-
-
-def test_bound_with_no_time() -> None:
-    result = bcut.bound("dodecahedron", time_limit=0)
-    assert (result.status, result.value, result.bound, result.triangulation) == ("limit", None, None, None)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_ctrl_c_in_a_separator_hands_out_what_there_is(method: str) -> None:
-    def interrupt(point: FractionalPoint) -> Iterator[Cut]:
-        raise KeyboardInterrupt
-        yield
-
+def test_a_value_that_the_first_bound_reaches_is_not_cut_for(sense: str) -> None:
+    """All triangulations have the same volume, at fractional points of the relaxation, too."""
+    watching = Watching()
     result = bcut.solve(
-        "random:12,3,seed=1000", spanning=True, separators=[Scripted(interrupt)], method=method
+        "random:16,3,seed=1", objective="volume", sense=sense, spanning=True, separators=[watching]
     )
-    assert result.status == "interrupted"
-    assert result.triangulation is not None
-    verify(result)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_separator_that_raises_ends_the_solve(method: str) -> None:
-    def fail(point: FractionalPoint) -> Iterator[Cut]:
-        raise OSError("gone")
-        yield
-
-    with pytest.raises(
-        SeparatorError, match=r"separator 'mine': separate\(\) raised OSError: gone"
-    ) as caught:
-        bcut.solve("random:12,3,seed=1000", spanning=True, separators=[Scripted(fail, "mine")], method=method)
-    assert "in fail" in caught.value.trace
-
-
-def test_a_separator_that_is_invalid_is_not_believed_for_a_triangulation(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    formulation = cocircuit_formulation(load_instance("cube:3"))
-
-    def dissection(search: Any) -> None:
-        search.offer(np.array([0, 1, 2]))
-        search.status = "optimal"
-
-    monkeypatch.setattr("bcut.solving.levels.solve_by_targets", dissection)
-    assert len(formulation.simplices) > 3
-    with pytest.raises(SolverError, match="cube:3: the solver's answer is no triangulation"):
-        bcut.solve("cube:3")
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"time_limit": -1}, "time limit -1"),
-        ({"time_limit": float("nan")}, "time limit nan"),
-        ({"time_limit": float("inf")}, "finite number of seconds"),
-        ({"seed": -1}, "seed -1"),
-        (
-            {"method": "magic"},
-            "unknown method 'magic': known are auto, listing, orbits, fixing, elimination, scip",
-        ),
-        ({"formulation": "7"}, "unknown formulation '7'"),
-        ({"sense": "best"}, "'min' or 'max'"),
-        ({"objective": "beauty"}, "unknown objective 'beauty'"),
-    ],
-)
-def test_bad_options_are_refused(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        bcut.solve("cube:3", **options)
-
-
-@pytest.mark.parametrize(
-    ("separators", "message"),
-    [
-        (["clik"], "unknown separator"),
-        (["clique", "clique:max_cuts=3"], "'clique' is given twice"),
-        ([7], "7 is no separator"),
-        ([dict], "is no separator"),
-    ],
-)
-def test_bad_separators_are_refused(separators: list[Any], message: str) -> None:
-    with pytest.raises(SeparatorLoadError, match=message):
-        bcut.solve("cube:3", separators=separators)
-
-
-def test_separators_may_be_names_classes_or_objects() -> None:
-    for separator in ("link", HullCuts, HullCuts()):
-        result = bcut.solve("random:9,2,seed=1", separators=[separator])
-        assert result.status == "optimal"
+    assert result.optimal
+    assert result.root.integral is False
+    assert (result.nodes, watching.points) == (0, [])
+    assert verify(result).value == pytest.approx(result.value)
