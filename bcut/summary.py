@@ -99,11 +99,20 @@ def _number(value: float | None) -> str:
     return "none" if value is None else f"{value:.10g}"
 
 
+def _may_have_reached_a_limit(result: Result) -> bool:
+    """Tell whether a limit that was asked for can be what ended a run."""
+    limits = result.problem.limits
+    seconds = limits.get("time")
+    # Stages end a moment before the limit, rather than after it.
+    in_time = seconds is None or result.seconds.get("total", 0.0) < 0.9 * seconds
+    return limits.get("memory") is not None or not in_time
+
+
 def _status(result: Result) -> str:
     text = _MEANING.get(result.status, result.status)
     if result.status in ("optimal", "infeasible"):
         return f"{text} ({_reason(result)})"
-    if result.status == "limit" and not any(limit is not None for limit in result.problem.limits.values()):
+    if result.status == "limit" and not _may_have_reached_a_limit(result):
         text = "a limit of the solvers' accuracy, or of what fits into memory, came first"
     return text if not result.gap else f"{text}; gap {100 * result.gap:.2f} %"
 

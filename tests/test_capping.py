@@ -135,6 +135,34 @@ def test_prices_that_keep_simplices_out(method: str, case: int, least: int, tmp_
     assert verify(result).value == best
 
 
+@pytest.mark.parametrize("sense", ["min", "max"])
+def test_no_cap_changes_a_cost_that_no_double_holds(sense: Any, tmp_path: Path) -> None:
+    """Every triangulation needs simplices that cost 2^53 + 1: there is nothing to cap."""
+    configuration = load_instance("random:7,2,seed=5")
+    formulation = cocircuit_formulation(configuration, spanning=True)
+    rng = np.random.default_rng(0)
+    sign = 1 if sense == "min" else -1
+    costs = [
+        sign * (2**53 + 1 if rng.random() < 0.8 else int(rng.integers(1, 9))) for _ in formulation.simplices
+    ]
+    table = [[simplex, cost] for simplex, cost in zip(formulation.simplices.tolist(), costs, strict=True)]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": table}))
+    values = [
+        sum(costs[column] for column in chosen)
+        for chosen in triangulations(formulation.chirotope, spanning=True)
+    ]
+    result = bcut.solve(configuration, objective=f"costs:{file}", spanning=True, sense=sense, method="orbits")
+    assert (result.status, verify(result).value) == ("optimal", sign * min(abs(value) for value in values))
+
+
+@pytest.mark.parametrize("name", ["0", "1"])
+def test_a_cap_from_a_poor_triangulation_is_lowered(name: str) -> None:
+    best = bcut.solve("random:8,2,seed=1", objective="aspect-ratio")
+    result = bcut.solve("random:8,2,seed=1", objective="aspect-ratio", formulation=name)
+    assert (result.status, result.value) == ("optimal", pytest.approx(best.value))
+
+
 @pytest.mark.parametrize("method", ["listing", "scip", "orbits"])
 @pytest.mark.parametrize("sense", ["min", "max"])
 def test_costs_that_cancel_are_not_called_optimal_before_they_are(
@@ -163,6 +191,23 @@ def test_costs_that_cancel_are_not_called_optimal_before_they_are(
     assert (result.status == "optimal") <= (result.value == best)
     assert ("a limit of the solvers' accuracy" in str(result)) == (result.status == "limit")
     assert verify(result).value == result.value
+
+
+def test_an_interrupt_while_costs_are_capped_loses_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupted(search: Search) -> None:
+        raise KeyboardInterrupt
+
+    configuration = load_instance("random:9,2,seed=1")
+    simplices = cocircuit_formulation(configuration).simplices.tolist()
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"default": 10**10, "costs": [[simplex, 1.5] for simplex in simplices[::2]]}))
+    monkeypatch.setattr("bcut.solving.capping.without_bad_simplices", interrupted)
+    result = bcut.solve(configuration, objective=f"costs:{file}", method="orbits")
+    assert result.status == "interrupted"
+    assert result.bound is not None
+    assert verify(result).value >= result.bound
 
 
 def test_the_other_sense() -> None:

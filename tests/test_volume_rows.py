@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from oracles import incidence as all_triangulations
 
 import bcut
 from bcut.bounds.root import root_bound
+from bcut.formulations.cocircuits import cocircuit_formulation
 from bcut.formulations.formulation import UNBOUNDED
 from bcut.formulations.lazy_rows import CoverageRows
 from bcut.formulations.volume_rows import volume_rows
@@ -103,3 +105,33 @@ def test_shares_of_the_hull_are_0_or_not_too_small_for_solvers() -> None:
     assert set(lower[lower < 2.0**-28]) == {0.0}
     assert upper.min() == 2.0**-28
     assert (lower <= upper).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "sense", "seed"), [("1", "max", 5592), ("0", "max", 5226), ("0", "max", 5174)]
+)
+def test_what_encloses_a_row_is_left_alone_by_scip(name: str, sense: Any, seed: int, tmp_path: Path) -> None:
+    """Most costs are large: with its own presolve and cuts SCIP called other triangulations optimal, or none."""
+    configuration = load_instance("random:8,2,seed=1")
+    simplices = cocircuit_formulation(configuration).simplices.tolist()
+    rng = np.random.default_rng(seed)
+    rng.choice(3)
+    small = zip(rng.integers(-3, 8, len(simplices)), rng.choice([1, 2, 3, 101], len(simplices)), strict=True)
+    share, size, sign = rng.random(), 10 ** int(rng.integers(2, 16)), int(rng.choice([1, -1]))
+    costs = [Fraction(int(a), int(b)) for a, b in small]
+    costs = [
+        sign * Fraction(size + int(rng.integers(5)), int(rng.choice([1, 3])))
+        if rng.random() < share
+        else cost
+        for cost in costs
+    ]
+    table = [[simplex, str(cost)] for simplex, cost in zip(simplices, costs, strict=True)]
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": table}))
+    values = [
+        sum(costs[column] for column in chosen) for chosen in triangulations(Chirotope.of(configuration))
+    ]
+    result = bcut.solve(
+        configuration, objective=f"costs:{file}", sense=sense, formulation=name, method="scip"
+    )
+    assert (result.status, result.value) == ("optimal", pytest.approx(float(max(values)), rel=1e-9))

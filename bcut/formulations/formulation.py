@@ -91,6 +91,11 @@ class Formulation:
         face = self.row_faces[row]
         return "coverage" if face is None else "cocircuit_" + "_".join(map(str, face))
 
+    @property
+    def has_enclosing_rows(self) -> bool:
+        """Whether two rows enclose an exact one, see `bcut.formulations.volume_rows`."""
+        return self.row_shifts is not None and bool(self.row_shifts.any())
+
     @cached_property
     def scaled(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """What solvers are shown: entries in the order of ``matrix.data``, lower and upper sides (perhaps infinite)."""

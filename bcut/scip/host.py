@@ -156,7 +156,7 @@ def branch_and_cut(
     model, variables = build_model(
         formulation, objective, cuts=cuts, name=formulation.configuration.name, costs=objective.solver_costs
     )
-    _set_parameters(model, options)
+    _set_parameters(model, formulation, options)
     _set_limits(model, options, time.perf_counter() - started, unit)
     # Separators and records see the d-simplices only.
     simplices = variables[: len(formulation.simplices)]
@@ -186,18 +186,20 @@ def branch_and_cut(
     return result
 
 
-def _set_parameters(model: Model, options: TreeOptions) -> None:
+def _set_parameters(model: Model, formulation: Formulation, options: TreeOptions) -> None:
     model.setParam("randomization/randomseedshift", options.seed % 2**31)
     # One Ctrl-C stops the search and keeps the incumbent.
     model.setParam("misc/catchctrlc", True)
     if options.plain:
         return
-    if not options.presolve:
+    # What enclosing rows leave between them is less than SCIP's tolerance: its presolve and its own cuts take more.
+    narrow = formulation.has_enclosing_rows
+    if narrow or not options.presolve:
         model.setPresolve(SCIP_PARAMSETTING.OFF)
         model.setParam("presolving/maxrestarts", 0)
     # Probing takes most of the time on these models and finds next to nothing.
     model.setParam("propagating/probing/maxprerounds", 0)
-    if not options.scip_separators:
+    if narrow or not options.scip_separators:
         model.setSeparating(SCIP_PARAMSETTING.OFF)
     for name in (*options.named, *options.unlimited):
         model.setParam(f"separating/{name}/freq", 0)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from bcut.bounds.compact_bound import CompactBound, compact_bound, restricted_program
 from bcut.bounds.compact_relaxation import CompactDuals, bound_relaxation
 from bcut.result import Certificate
-from bcut.solving.capping import capped_costs
+from bcut.solving.capping import with_capped_costs
 from bcut.solving.compact_part import CompactPart, anneal_incumbent, improve_incumbent
 from bcut.solving.fixing_certificate import certify, make_compact_certificate
 from bcut.solving.memory import used_memory
@@ -329,8 +329,7 @@ class _Fixing:
         """Find the best triangulation on some columns."""
         child = self._child(columns)
         try:
-            with capped_costs(child):
-                solve_at_once(child)
+            with_capped_costs(child, solve_at_once)
         finally:
             self._keep(child, columns, beyond)
         return child

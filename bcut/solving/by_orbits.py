@@ -90,22 +90,24 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
     root = stage.root
     if root.bound is None:
         return stage
-    search.lp = search.lp_after_cuts = root.lp
-    search.raise_bound(root.bound.value)
-    search.certificate = make_orbit_certificate(stage)
-    search.report("orbits", lp=root.lp)
+    search.lp = root.lp
+    _keep_bound(search, stage)
     n, d = stage.configuration.n, stage.configuration.dimension
     if cuts and not is_optimal(search) and comb(n, d - 1) <= _MOST_FACES:
         with search.timed("root"):
             left = search.seconds_left
             stage = stage.with_link_cuts(seconds=None if left is None else lambda: search.seconds_left or 0.0)
-        assert stage.root.bound is not None
         _record(search, stage)
-        search.lp_after_cuts = stage.root.lp
-        search.raise_bound(stage.root.bound.value)
-        search.certificate = make_orbit_certificate(stage)
-        search.report("orbits", lp=stage.root.lp)
+        _keep_bound(search, stage)
     return stage
+
+
+def _keep_bound(search: Search, stage: OrbitStage) -> None:
+    assert stage.root.bound is not None
+    search.lp_after_cuts = stage.root.lp
+    search.raise_bound(stage.root.bound.value)
+    search.certificate = make_orbit_certificate(stage)
+    search.report("orbits", lp=stage.root.lp)
 
 
 def _record(search: Search, stage: OrbitStage) -> None:
@@ -134,8 +136,13 @@ def solve_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> None:
     best = _Best(search.whole, search.columns)
     search.offer(search.whole.columns)
     best.keep(search)
-    stage = capped_stage(search, stage)
-    best.keep(search)
+    try:
+        stage = capped_stage(search, stage)
+    except (KeyboardInterrupt, MemoryError):
+        _keep_bound(search, stage)
+        raise
+    finally:
+        best.keep(search)
     stage = bound_by_orbits(search, stage, cuts=cuts)
     if search.bound is None:
         return

@@ -10,7 +10,7 @@ true ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from fractions import Fraction
@@ -26,19 +26,36 @@ from bcut.solving.search import Part, Search
 
 # Costs that are no larger than so many times nearly all of them do no harm.
 _SPREAD, _NEARLY_ALL = 1000.0, 0.02
+# A cap that is so many times lower is worth another search.
+_LOWER = 4
 
 
 @contextmanager
-def capped_costs(search: Search) -> Iterator[None]:
-    """Cap the costs of a search within the block, where they are too different for solvers."""
+def capped_costs(search: Search) -> Iterator[Fraction | None]:
+    """Cap the costs of a search within the block, where they are too different for solvers; yields the cap."""
     whole = search.whole
     limit = _limit_of_costs(search)
     if limit is not None:
         search.whole = Part(whole.formulation, _limited(whole.objective, limit), whole.columns)
     try:
-        yield
+        yield limit
     finally:
         search.whole = whole
+
+
+def with_capped_costs(search: Search, work: Callable[[Search], None]) -> None:
+    """Do a piece of a search with capped costs.
+
+    It is done again, with a lower cap, where it ends because solvers cannot tell values apart, and has found so much
+    better a triangulation that they can then.
+    """
+    while True:
+        with capped_costs(search) as limit:
+            work(search)
+        if limit is None or search.value is None or search.status != "limit" or search.seconds_left == 0.0:
+            return
+        if _cap(search.whole.objective, search.value) > abs(limit) / _LOWER:
+            return
 
 
 def capped_stage(search: Search, stage: OrbitStage) -> OrbitStage:
@@ -85,9 +102,13 @@ def _limit_of_costs(search: Search) -> Fraction | None:
         search.offer(found)
     if search.value is None:
         return None
-    # A power of two that is at least twice as much.
-    cap = 2.0 ** (frexp(abs(float(search.value)) + _gained(objective))[1] + 1)
-    return objective.sign * Fraction(min(cap, objective.largest_cost))
+    cap = _cap(objective, search.value)
+    return None if cap >= objective.largest_cost else objective.sign * Fraction(cap)
+
+
+def _cap(objective: Objective, value: Fraction) -> float:
+    """Return a power of two that is at least twice the cost of a simplex in a triangulation as good as a known one."""
+    return 2.0 ** (frexp(abs(float(value)) + _gained(objective))[1] + 1)
 
 
 def _are_too_different(objective: Objective) -> bool:

@@ -20,7 +20,7 @@ from bcut.objectives.objective import Bottleneck, objective_of
 from bcut.objectives.syntax import ObjectiveName
 from bcut.result import Certificate, LevelQuestion, LevelRecord
 from bcut.solving.bottleneck import solve_bottleneck
-from bcut.solving.capping import capped_costs
+from bcut.solving.capping import with_capped_costs
 from bcut.solving.certificates import make_certificate
 from bcut.solving.embedding import costs_to_embed
 from bcut.solving.report import as_number, gap, proven_bound, settles
@@ -36,8 +36,7 @@ def solve_listed(search: Search) -> None:
     elif objective.counts_units:
         solve_by_targets(search)
     else:
-        with capped_costs(search):
-            solve_at_once(search)
+        with_capped_costs(search, solve_at_once)
 
 
 @dataclass

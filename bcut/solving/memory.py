@@ -61,7 +61,7 @@ def interrupt() -> None:
 
 
 def _imports(thread: int) -> int:
-    """Return in how many imports, one inside the other, a thread is."""
+    """Return how many frames of the import system are on a thread's stack: more of them, further inside an import."""
     count, frame = 0, sys._current_frames().get(thread)
     while frame is not None:
         count += frame.f_code.co_filename == "<frozen importlib._bootstrap>"
@@ -76,7 +76,8 @@ def watched(watch: Watch, *, memory: float | None, deadline: float | None) -> It
     Solvers and loops hear an interrupt within a moment and keep what they have found, and so one mechanism serves all
     stages; those that watch the deadline themselves end before this does. An interrupt, also one by Ctrl-C, that
     arrives where Python cannot raise it, in a callback of compiled code for one, is sent again. Limits wait for a
-    library that is being imported: a process can do nothing with what an interrupt leaves of it, and has no other.
+    library that is being imported, for ten seconds at most: a process can do nothing with what an interrupt leaves of
+    it, and has no other.
 
     Nothing is watched outside the main thread, where interrupts do not arrive.
 

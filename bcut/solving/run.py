@@ -25,7 +25,7 @@ from bcut.solving.bottleneck import solve_bottleneck
 from bcut.solving.by_elimination import empty_part, solve_by_elimination
 from bcut.solving.by_fixing import bound_by_fixing, solve_by_fixing
 from bcut.solving.by_orbits import bound_by_orbits, known_triangulation, solve_by_orbits, solve_invariant
-from bcut.solving.capping import capped_costs
+from bcut.solving.capping import with_capped_costs
 from bcut.solving.certificates import make_certificate, make_infeasibility_certificate
 from bcut.solving.compact_part import begin_fixing, make_program, without_columns
 from bcut.solving.embedding import costs_to_embed
@@ -231,8 +231,7 @@ class Run:
             else:
                 solve_invariant(self.search, self.stage, self.subgroups, cuts=self.link)
         elif self.method == "scip":
-            with capped_costs(self.search):
-                solve_in_scip(self.search)
+            with_capped_costs(self.search, solve_in_scip)
         elif self.method == "fixing":
             solve_by_fixing(self.search)
         elif self.method == "elimination":
