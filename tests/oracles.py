@@ -128,8 +128,8 @@ def with_depth(monkeypatch: pytest.MonkeyPatch) -> tuple[Formulation, Objective]
     """A problem on which SCIP, with a bad branching rule from here on, goes down some levels."""
     set_parameters = host._set_parameters
 
-    def with_bad_branching(model: Any, options: Any) -> None:
-        set_parameters(model, options)
+    def with_bad_branching(model: Any, formulation: Formulation, options: Any) -> None:
+        set_parameters(model, formulation, options)
         model.setParam("branching/random/priority", 10**6)
         model.setParam("propagating/maxrounds", 0)
 
