@@ -23,7 +23,7 @@ from bcut.separation.driver import IntegerCut
 # is faster again.
 _INTERIOR_POINT_FROM = 1500
 _SIMPLEX_ITERATIONS = 0.4
-# Up to this many columns HiGHS takes milliseconds, less than a thread to interrupt it from and its callbacks would.
+# Up to this many columns HiGHS is done before anybody would interrupt it, often sooner than a thread for that starts.
 _AT_ONCE = 1000
 # Rows of the formulation that are left to be asked for count as violated from this much on.
 _LAZY_TOLERANCE = 1e-6

@@ -87,10 +87,8 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
     OrbitStage
         With the better bound.
     """
-    root = stage.root
-    if root.bound is None:
+    if stage.root.bound is None:
         return stage
-    search.lp = root.lp
     _keep_bound(search, stage)
     n, d = stage.configuration.n, stage.configuration.dimension
     if cuts and not is_optimal(search) and comb(n, d - 1) <= _MOST_FACES:
@@ -104,6 +102,8 @@ def bound_by_orbits(search: Search, stage: OrbitStage, *, cuts: bool) -> OrbitSt
 
 def _keep_bound(search: Search, stage: OrbitStage) -> None:
     assert stage.root.bound is not None
+    if search.lp is None:
+        search.lp = stage.root.lp
     search.lp_after_cuts = stage.root.lp
     search.raise_bound(stage.root.bound.value)
     search.certificate = make_orbit_certificate(stage)

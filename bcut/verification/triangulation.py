@@ -153,13 +153,16 @@ class _Check:
             self._hull = hull_volume(self.points, self.simplices[0])
         return self._hull
 
+    def _plane(self, facet: Simplex) -> Hyperplane:
+        found = self.planes.get(facet)
+        if found is None:
+            found = self.planes[facet] = self.points.hyperplane(facet)
+        return found
+
     def flatness(self) -> None:
         """Refuse simplices without volume."""
         for number, simplex in enumerate(self.simplices):
-            facet = simplex[:-1]
-            if facet not in self.planes:
-                self.planes[facet] = self.points.hyperplane(facet)
-            volume = abs(self.points.value(self.planes[facet], simplex[-1]))
+            volume = abs(self.points.value(self._plane(simplex[:-1]), simplex[-1]))
             if not volume:
                 raise VerificationError(
                     f"simplex {number}, {list(simplex)}, is flat: "
@@ -172,9 +175,7 @@ class _Check:
         overlaps: list[str] = []
         lonely: list[str] = []
         for facet, opposite in self._opposite_vertices().items():
-            if facet not in self.planes:
-                self.planes[facet] = self.points.hyperplane(facet)
-            plane = self.planes[facet]
+            plane = self._plane(facet)
             by_side: dict[int, list[int]] = {}
             for vertex in opposite:
                 by_side.setdefault(self.points.side(plane, vertex), []).append(vertex)
